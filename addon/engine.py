@@ -37,6 +37,7 @@ MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and 
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 STEREO = ("left", "right")
+CATCHERS_WHOLE = "A picture with shadow catchers cannot be rendered in slices: render it whole."
 
 
 @dataclass
@@ -256,7 +257,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             keep = partial(taken.__setitem__, layer.name)
         catches, moments = snapshot.has_catchers and not self.is_preview, self._moments
         if catches and (taken is not None or given or settings.is_slice):
-            raise ValueError("A picture with shadow catchers cannot be rendered in slices: render it whole.")
+            raise ValueError(CATCHERS_WHOLE)
         if moments is not None and eye:  # seen through the eye's camera at the frame itself
             seen = (replace(one, camera=snapshot.camera) for one in moments.snapshots)
             moments = replace(moments, snapshots=tuple(seen))

@@ -206,16 +206,19 @@ def _frame(text: str) -> int:
 
 
 def _frames(text: str) -> list[int]:
-    found: list[int] = []
+    beyond = argparse.ArgumentTypeError(f"'{text}' holds no frame, or one beyond {FRAMES[0]} to {FRAMES[-1]}")
+    found: dict[int, None] = {}
     for part in text.split(","):
-        match = re.fullmatch(r"\s*(-?\d+)(?:-(-?\d+)(?::(\d+))?)?\s*", part)
+        match = re.fullmatch(r"\s*(-?\d{1,12})(?:-(-?\d{1,12})(?::(\d{1,12}))?)?\s*", part)
         if match is None or int(match[3] or 1) < 1:
             raise argparse.ArgumentTypeError(f"'{text}' are no frames: 1-10, 1-100:5 or 1,3,7 are")
         first, last = int(match[1]), int(match[2] or match[1])
-        found += range(first, last + 1, int(match[3] or 1))
-    if not found or not all(frame in FRAMES for frame in found):
-        raise argparse.ArgumentTypeError(f"'{text}' holds no frame, or one beyond {FRAMES[0]} to {FRAMES[-1]}")
-    return list(dict.fromkeys(found))
+        if first not in FRAMES or last not in FRAMES:  # before they are listed, which could fill the memory
+            raise beyond
+        found |= dict.fromkeys(range(first, last + 1, int(match[3] or 1)))
+    if not found:
+        raise beyond
+    return list(found)
 
 
 def _positive(text: str) -> float:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import bpy
 
-from . import untrusted
+from . import slices, untrusted
 from .files import output, placed_in
 from .refused import USAGE, Refused
 from .verbs import Job
@@ -37,13 +37,20 @@ def write_job(job: Job) -> None:
     options, scene = job.options, job.scene
     folder = output(options.output, folder=True)
     results = (options.results or folder / "pictures").resolve()
-    frames = options.frames or list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+    frames = options.frames
+    if frames is None and options.frame is not None:
+        frames = [options.frame]
+    if frames is None:
+        frames = list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
     parts = chunks(frames, options.chunk)
     if len(parts) > MOST_CHUNKS:
         fitting = -(-len(frames) // MOST_CHUNKS)
         raise Refused(
             f"A job has at most {MOST_CHUNKS} chunks and this one {len(parts)}: --chunk {fitting} fits.", USAGE
         )
+    if options.split_samples > 1:  # what every task would refuse
+        slices.check_layers(scene)
+        slices.check_catchers(scene, job.layer)
     if options.split_samples > scene.candela.samples:
         raise Refused(f"{scene.candela.samples} samples cannot be split into {options.split_samples} slices.", USAGE)
     name = options.file.stem

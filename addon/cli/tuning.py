@@ -13,7 +13,7 @@ from ..frame import ledger as ledgers
 from ..gfx import context
 from ..techniques import REGISTRY
 from ..ui.properties import settings_of
-from ..ui.tuning import AGAIN, SEED, choices, properties
+from ..ui.tuning import AGAIN, SEED, apply, choices, properties
 from . import untrusted
 from .files import output
 from .refused import USAGE, Refused, reason
@@ -94,14 +94,14 @@ def _renders(job: Job, layer, truth, deadline: float, seconds: float, terminal):
 
 
 def save(file: Path, scene: str, candidate: tune.Candidate, path: Path) -> None:
-    """Open the file anew, change nothing but Candela's settings of the scene, and write it. Raises Refused."""
+    """Open the file anew, change nothing but Candela's settings of the scene and the samples of its view layers, and
+    write it. Raises Refused."""
     try:
         with quiet():
             problem = open_mainfile(file)
             if problem:
                 raise Refused(f"{file} could not be opened: {problem}.")
-            for name, value in properties(candidate):
-                setattr(bpy.data.scenes[scene].candela, name, value)
+            apply(bpy.data.scenes[scene], candidate)
             bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False, compress=True)
     except RuntimeError as error:
         raise Refused(f"{path} could not be written: {reason(error)}.") from None

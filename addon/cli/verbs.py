@@ -167,10 +167,7 @@ def numbered(path: Path, frame: int, several: bool) -> Path:
 def _share_out(job: Job, path: Path) -> None:
     """Set the samples of the slice that is asked for. Raises Refused."""
     slices.check_output(path)
-    if any(layer.samples for layer in job.scene.view_layers):
-        raise Refused(
-            "View layers have numbers of samples of their own; with --slice, --samples gives one for all.", USAGE
-        )
+    slices.check_layers(job.scene)
     group = job.scene.candela
     try:
         group.sample_offset, group.sample_count = slices.bounds(job.options.slice, group.samples)

@@ -74,11 +74,13 @@ class NoiseMeter:
 
 
 def relative_change(now: np.ndarray, before: np.ndarray) -> float:
-    """Root mean square of what a picture has changed by, by its luminance; 0 of one that is black."""
+    """Root mean square of what a picture has changed by, by its luminance; 0 of one that is black. Values that are not
+    finite count as 0, as in the finished picture: one alone would make every figure here NaN."""
+    now, before = (np.nan_to_num(one, nan=0.0, posinf=0.0, neginf=0.0) for one in (now, before))
     luminance = now @ LUMINANCE
     dark = DARK * abs(float(luminance.mean()))
     if not dark > 0.0:
         return 0.0
     squared = ((now - before) ** 2).mean(axis=-1) / (luminance**2 + dark**2)
-    kept = squared.size - int(np.ceil(squared.size * WORST))
-    return float(np.sqrt(np.partition(squared.ravel(), kept - 1)[:kept].mean())) if kept > 0 else 0.0
+    kept = max(squared.size - int(np.ceil(squared.size * WORST)), 1)  # of a single pixel it is the pixel
+    return float(np.sqrt(np.partition(squared.ravel(), kept - 1)[:kept].mean()))

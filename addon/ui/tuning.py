@@ -60,7 +60,18 @@ def changes(scene, candidate: tune.Candidate) -> list[tuple[str, str, str]]:
         if now != value:
             declared = scene.candela.bl_rna.properties[name]
             found.append((declared.name, _worded(declared, now), _worded(declared, value)))
+    for layer in scene.view_layers:
+        if layer.samples:
+            found.append((f"Samples of view layer {layer.name}", str(layer.samples), "the scene's"))
     return found
+
+
+def apply(scene, candidate: tune.Candidate) -> None:
+    """Set what the candidate says, and let it count: view layers give up numbers of samples of their own."""
+    for name, value in properties(candidate):
+        setattr(scene.candela, name, value)
+    for layer in scene.view_layers:
+        layer.samples = 0
 
 
 def _worded(declared, value) -> str:
@@ -237,8 +248,7 @@ class CANDELA_OT_tune_apply(bpy.types.Operator):
             row.label(text=f"{now} → {then}")
 
     def execute(self, context):
-        for name, value in properties(self._candidate(context)):
-            setattr(context.scene.candela, name, value)
+        apply(context.scene, self._candidate(context))
         return {"FINISHED"}
 
 

@@ -1,5 +1,6 @@
 """Jobs for render farms, run by the runtimes that farms use: OpenJD's sessions dispatched by Dask, and Node.js."""
 
+import argparse
 import json
 import os
 import shutil
@@ -290,6 +291,23 @@ def test_a_farm_that_loses_a_worker_makes_what_one_process_makes(moving, tmp_pat
     assert not list((bundle / "pictures").glob(".writing_*"))
 
 
+@pytest.mark.parametrize(
+    "text", ["1-99999999999", "-99999999999-1", "1-99999999999:7", "99999999999-1", "1,1048575", "1-" + 5000 * "9"]
+)
+def test_frames_beyond_those_of_blender_are_refused_before_they_are_listed(text):
+    from addon import cli
+
+    with pytest.raises(argparse.ArgumentTypeError):
+        cli._frames(text)
+
+
+def test_ranges_that_overlap_are_frames_once_and_in_order():
+    from addon import cli
+
+    assert cli._frames("3, 1-7:2,-2--1") == [3, 1, 5, 7, -2, -1]
+    assert len(cli._frames(",".join(20 * ["1-100000"]))) == 100000
+
+
 def test_the_operator_writes_the_job_of_the_saved_file(registered, tmp_path):
     import bpy
 
@@ -305,6 +323,111 @@ def test_the_operator_writes_the_job_of_the_saved_file(registered, tmp_path):
     assert arguments[arguments.index("--scene") + 1] == "Cornell Box"
     bpy.ops.wm.read_factory_settings(use_empty=True)
     assert not bpy.ops.candela.farm_job.poll()
+
+
+@pytest.fixture
+def box(registered):
+    """The scene of a saved file, drawn by Candela."""
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends" / "cornell_box.blend"))
+    bpy.context.scene.render.engine = "CANDELA"
+    return bpy.context.scene
+
+
+def written(folder, scene, layer=None, **given) -> list[str]:
+    """The chunks of the job that `farm` writes of an open scene."""
+    import bpy
+
+    from addon.cli import _parser, farm
+    from addon.cli.verbs import Job
+
+    options = _parser("candela").parse_args(["farm", bpy.data.filepath, "--output", str(folder)])
+    vars(options).update(given)
+    farm.write_job(Job(options, scene, layer))
+    template = json.loads((folder / "template.json").read_text("utf-8"))
+    return template["steps"][0]["parameterSpace"]["taskParameterDefinitions"][0]["range"]
+
+
+def test_a_job_of_slices_of_layers_with_samples_of_their_own_is_refused(box, tmp_path):
+    import bpy
+
+    from addon.cli.refused import Refused
+
+    box.view_layers[0].samples = 64
+    with pytest.raises(Refused, match="samples of their own"):
+        written(tmp_path / "job", box, split_samples=2)
+    with pytest.raises(RuntimeError, match="samples of their own"):
+        bpy.ops.candela.farm_job(directory=str(tmp_path / "job"), split_samples=2)
+    assert not list(tmp_path.iterdir())
+    written(tmp_path / "job", box)
+    box.view_layers[0].samples = 0
+    written(tmp_path / "sliced", box, split_samples=2)
+
+
+def test_a_job_of_slices_with_a_shadow_catcher_is_refused(box, tmp_path):
+    import bpy
+
+    from addon.cli.refused import Refused
+
+    def refused(layer=None) -> bool:
+        try:
+            written(tmp_path / "job", box, layer, split_samples=2)
+        except Refused as refusal:
+            assert "shadow catchers" in str(refusal)
+            assert not list(tmp_path.iterdir())
+            return True
+        shutil.rmtree(tmp_path / "job")
+        return False
+
+    thing = next(one for one in box.objects if one.type == "MESH")
+    thing.is_shadow_catcher = True
+    assert refused()
+    with pytest.raises(RuntimeError, match="shadow catchers"):
+        bpy.ops.candela.farm_job(directory=str(tmp_path / "job"), split_samples=2)
+    written(tmp_path / "whole", box)
+    shutil.rmtree(tmp_path / "whole")
+
+    thing.hide_render = True
+    assert not refused()
+    thing.hide_render = False
+    apart = bpy.data.collections.new("Apart")
+    box.collection.children.link(apart)
+    for one in thing.users_collection:
+        one.objects.unlink(thing)
+    apart.objects.link(thing)
+    assert refused()
+    without = box.view_layers.new("Without")
+    without.layer_collection.children["Apart"].exclude = True
+    assert refused() and not refused(without)
+    box.view_layers[0].use = False
+    assert not refused() and refused(box.view_layers[0])
+    box.view_layers[0].use = True
+
+    box.collection.children.unlink(apart)  # drawn by an instance of the collection alone
+    assert not refused()
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", apart
+    box.collection.objects.link(empty)
+    assert refused()
+    thing.is_shadow_catcher = False
+    assert not refused()
+    empty.is_shadow_catcher = True
+    assert refused()
+
+
+@pytest.mark.parametrize(
+    ("given", "chunks"),
+    [
+        ({"frame": 7}, ["7"]),
+        ({"frame": 0}, ["0"]),
+        ({"frame": 7, "frames": [3, 4], "chunk": 2}, ["3-4"]),  # as for render
+        ({"chunk": 2}, ["2-3", "4"]),
+    ],
+)
+def test_a_job_is_of_the_frames_that_are_asked_for(box, tmp_path, given, chunks):
+    box.frame_start, box.frame_end = 2, 4
+    assert written(tmp_path / "job", box, **given) == chunks
 
 
 FLAMENCO_STUBS = """

@@ -50,6 +50,25 @@ def test_a_black_picture_has_no_noise():
     assert relative_change(np.zeros((8, 8, 3)), np.zeros((8, 8, 3))) == 0.0
 
 
+def test_the_noise_of_a_single_pixel_counts():
+    assert relative_change(np.full((1, 1, 3), 2.0), np.ones((1, 1, 3))) == pytest.approx(0.5, rel=0.01)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["now", "before", "both"])
+def test_a_value_that_is_not_finite_does_not_hide_the_noise_of_the_others(bad, where):
+    numbers = np.random.default_rng(1)
+    now, before = (1.0 + 0.2 * numbers.normal(size=(64, 64, 1)) * np.ones(3) for _ in range(2))
+    clean = relative_change(now, before)
+    for picture in {"now": [now], "before": [before], "both": [now, before]}[where]:
+        picture[5, 5, 0] = bad
+    assert clean > 0.1 and relative_change(now, before) == pytest.approx(clean, rel=0.05)
+    meter = NoiseMeter(0.01)
+    for done, mean in ((4, before), (8, now)):
+        meter.learn(done, mean)
+    assert meter.enough is None
+
+
 def test_a_picture_that_does_not_change_is_enough():
     meter = NoiseMeter(0.01)
     for done in (4, 8, 16):

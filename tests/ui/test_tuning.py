@@ -3,6 +3,7 @@
 import bpy
 import pytest
 
+from addon.cli import tuning as saved
 from addon.compare import reference, tune
 from addon.frame import ledger
 from addon.ui import tuning
@@ -55,6 +56,34 @@ def test_a_candidate_becomes_settings_and_properties_alike(floor):
     asked = tuning.changed(applied, candidate, applied.seed)
     assert asked == applied
     assert (applied.samples, applied.slots["shadow"], applied.values[name]) == (7, "vssm", 12)
+
+
+def layers_with_samples(scene):
+    other = scene.view_layers.new("Other")
+    scene.view_layers[0].samples, other.samples = 64, 0
+    return list(scene.view_layers)
+
+
+def test_applied_samples_count_in_view_layers_that_had_their_own(floor, monkeypatch):
+    layers = layers_with_samples(floor)
+    trial = tune.Trial(tune.Candidate(7), tune.Picture(0.1, 0.1, ()))
+    monkeypatch.setattr(tuning, "_found", tuning.Found(floor.session_uid, [trial], trial, 0.2))
+    row = (f"Samples of view layer {layers[0].name}", "64", "the scene's")
+    assert tuning.changes(floor, trial.candidate) == [("Samples", "1000", "7"), row]
+    assert bpy.ops.candela.tune_apply() == {"FINISHED"}
+    assert [tuning.settings_of(floor, False, layer=layer).samples for layer in layers] == [7, 7]
+    assert tuning.changes(floor, trial.candidate) == []
+
+
+def test_saved_samples_count_in_view_layers_that_had_their_own(floor, tmp_path):
+    layers_with_samples(floor)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "before.blend"))
+    saved.save(tmp_path / "before.blend", floor.name, tune.Candidate(7), tmp_path / "after.blend")
+    for name, expected in (("before", [64, 1000]), ("after", [7, 7])):
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / f"{name}.blend"))
+        scene = bpy.context.scene
+        found = [tuning.settings_of(scene, False, layer=layer).samples for layer in scene.view_layers]
+        assert found == expected
 
 
 def test_auto_is_a_choice_of_its_own_and_what_is_off_stays_off(floor):
