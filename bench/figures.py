@@ -20,6 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.cells import NO_TRUTH
+
 OWN, FAST, DRAFT = "Candela", "Candela, Fast preset", "Candela, Draft preset"
 MIDDLE = 16  # samples of Candela at which figures are quoted
 RESOLVED = 0.1  # of the reference's noise
@@ -48,7 +50,8 @@ class Results:
 
     @property
     def scenes(self) -> list[str]:
-        return list(dict.fromkeys(cell["scene"] for cell in self.cells))
+        """Those that have a truth."""
+        return [name for name in dict.fromkeys(cell["scene"] for cell in self.cells) if name not in NO_TRUTH]
 
     def labels(self, scene: str) -> list[str]:
         return list(dict.fromkeys(cell["series"]["label"] for cell in self.cells if cell["scene"] == scene))

@@ -15,7 +15,7 @@ from string import Template
 
 from bench import again, ages, markdown, plots, profile
 from bench import growth as growth_of_cost
-from bench.cells import RAW, ROOT
+from bench.cells import NO_TRUTH, RAW, ROOT
 from bench.figures import (
     MIDDLE,
     OWN,
@@ -302,10 +302,13 @@ def facts(results: Results) -> str:
 
 def reserve(results: Results) -> list[str]:
     """What a reader must know before believing the figures: what is missing, and whether the machine had rest."""
-    sentences = []
-    measured, asked = len(results.cells), len(results.cells) + len(results.left_out)
-    if results.left_out:
-        absent = sorted({name.partition(",")[0] for name in results.left_out} - set(results.scenes))
+    pages = ", ".join(f"{name.replace('_', ' ')} ({page})" for name, page in NO_TRUTH.items())
+    sentences = [f"Sample scenes of which Cycles gives no truth are not here: {pages}."]
+    cells = [cell for cell in results.cells if cell["scene"] not in NO_TRUTH]
+    left_out = [name for name in results.left_out if name.partition(",")[0] not in NO_TRUTH]
+    measured, asked = len(cells), len(cells) + len(left_out)
+    if left_out:
+        absent = sorted({name.partition(",")[0] for name in left_out} - set(results.scenes))
         sentences.append(
             f"{measured} of {asked} points were measured within the time that was given"
             + listed("; nothing of", absent) + ". Another run of the command goes on with the rest."
