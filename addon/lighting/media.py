@@ -110,6 +110,12 @@ class LightOfMedia(Service):
     add: Callable[[Frame, Technique, Rays, images.Target], None]
 
 
+def is_endless(frame: Frame) -> bool:
+    """Whether a medium without an end takes all light that comes from infinity."""
+    service = frame.service(MediaService)
+    return service is not None and service.media.endless
+
+
 @cache
 def attenuated(program: Program) -> Program:
     """The same pass for a scene with media."""

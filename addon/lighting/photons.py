@@ -48,7 +48,7 @@ from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
 from .interfaces import upload_interfaces
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
-from .media import MediaService
+from .media import is_endless
 
 FOUND = ("photon_points", "photon_normals", "photon_fluxes")
 EMISSION = Struct(
@@ -156,8 +156,7 @@ class Photons:
         many casters and only the mean of a known number of samples is shown, lights take turns: the photons of a view
         are smooth, and VIEWS of them in a sample cost about as much as its other light."""
         settings = frame.settings
-        media = frame.service(MediaService)
-        endless = media is not None and media.media.endless  # nothing comes from infinity
+        endless = is_endless(frame)
         answered = [
             one for one in frame.emitters
             if one.light.key in casters.lights and not (endless and one.kind == lights.SUN)

@@ -45,7 +45,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.emissive_triangles import EmissiveTriangles
-from ..lighting.media import RAY_TEXTURES, LightOfMedia, MediaEmission, MediaService, Rays
+from ..lighting.media import RAY_TEXTURES, LightOfMedia, MediaEmission, MediaService, Rays, is_endless
 from ..materials.compiler import may_emit
 from ..materials.graph import Graph
 from ..scene import acceleration
@@ -355,7 +355,7 @@ class Airlight(Technique):
         # Through fog without an end nothing comes from infinity.
         media = frame.service(MediaService)
         found = media.media.found if media is not None else []
-        self._endless = media is not None and media.media.endless
+        self._endless = is_endless(frame)
         self._lit_by_world = self._world and not self._endless and any(one.scatters for one in found)
         if media is not None:
             frame.provide(MediaEmission("radiance.volume_emission"))

@@ -39,7 +39,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting.media import MediaService
+from ..lighting.media import MediaService, is_endless
 from ..materials.compiler import may_refract
 from ..materials.graph import Graph
 from ..scene import acceleration
@@ -124,8 +124,7 @@ class VolumeCaustics(Technique):
         self._table = images.upload(table)
         bending = set(np.flatnonzero(table[:, 1, 0] > 0))
         self._casters = casters_of(frame.snapshot, bending, frame.geometry.origin)
-        media = frame.service(MediaService)
-        endless = media is not None and media.media.endless
+        endless = is_endless(frame)
         self._emitters = [
             one for one in frame.emitters if self._casters and one.light.visibility.volume and one.light.cast_shadow
             and not (endless and one.kind == lights.SUN)

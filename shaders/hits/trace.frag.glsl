@@ -65,14 +65,13 @@ void main()
   out_passed.w = luminance(abs(emission)) * t * t / max(abs(dot(normal, direction)), 1e-6);
   vec3 outwards = (dot(normal, shading) < 0.0) ? -normal : normal;
 #ifdef ABSORBING
-  int solid = material_index;
   vec3 absorbed = vec3(0.0);
   if (dot(outwards, direction) > 0.0) {
     absorbed = hit_materials_fetch(ivec2(material_index & 255, material_index >> 8)).rgb;
   }
   if (max_component(absorbed) <= 0.0) {
     float offset = max(offset_size, 2e-5 * distance(start.xyz, film_view.eye.xyz));
-    solid = solid_around(start.xyz, direction, offset, roll.x);
+    int solid = solid_around(start.xyz, direction, offset, roll.x);
     absorbed = (solid >= 0) ? hit_materials_fetch(ivec2(solid & 255, solid >> 8)).rgb : vec3(0.0);
   }
   out_passed.rgb = exp(-absorbed * t);
