@@ -263,6 +263,13 @@ def traceable(emitters: list[Emitter]) -> list[Emitter]:
     return sorted((e for e in emitters if e.extended), key=lambda e: -e.power)[:MOST_LIGHTS]
 
 
+def spread_choice(count: int, most: int, u: float) -> tuple[np.ndarray, float]:
+    """At most `most` of `count` lights, evenly out of all by the uniform number `u`, and how many each stands for."""
+    if count <= most:
+        return np.arange(count), 1.0
+    return ((np.arange(most) + u) * count / most).astype(int), count / most
+
+
 class Sources:
     """The uniform block of lights and depth-map views that the lighting shaders read."""
 

@@ -364,15 +364,12 @@ class Airlight(Technique):
     def _rows(self, frame: Frame) -> tuple[list[np.ndarray], list[lights.Emitter]]:
         """Points of this sample on lamps, shining meshes and the world, and the lamps among them."""
         emitters = [one for one in self._emitters if one.kind != lights.SUN or not self._endless]
-        count = len(emitters)
-        chosen = np.arange(count)
-        if count > MOST_LAMPS:
-            chosen = ((np.arange(MOST_LAMPS) + frame.uniform("airlight/choose")) * count / MOST_LAMPS).astype(int)
+        chosen, weight = lights.spread_choice(len(emitters), MOST_LAMPS, frame.uniform("airlight/choose"))
         rows = []
         for number in chosen:
             emitter = emitters[number]
             sample = emitter.sample(*frame.random_volume("airlight/light"))
-            rows.append(emitter.row(sample, 0, int(emitter.light.cast_shadow), max(count / MOST_LAMPS, 1.0)))
+            rows.append(emitter.row(sample, 0, int(emitter.light.cast_shadow), weight))
         if self._triangles is not None:
             for k in range(EMISSIVE_POINTS):
                 drawn = frame.random_volume_at(frame.sample * EMISSIVE_POINTS + k, "airlight/emissive")

@@ -135,7 +135,8 @@ class VolumeCaustics(Technique):
         if media is None or not self._emitters or not media.media.scatters:
             return
         side = min(frame.settings.get(self, "rays"), MOST_RAYS * max(frame.size))
-        turn, weight = self._turn(frame)
+        chosen, weight = lights.spread_choice(len(self._emitters), MOST_LAMPS, frame.uniform("beams/choose"))
+        turn = [self._emitters[k] for k in chosen]
         drawn = [one.sample(*frame.random_volume("beams/light")) for one in turn]
         sources = self._sources.set([e.row(point, 0, 1, weight) for e, point in zip(turn, drawn)])
         centre, radius = self._casters
@@ -174,14 +175,6 @@ class VolumeCaustics(Technique):
             yield
         for image in traced:
             images.pool.give(image)
-
-    def _turn(self, frame: Frame) -> tuple[list[lights.Emitter], float]:
-        """The lamps of this sample, evenly out of all, and how many each stands for."""
-        count = len(self._emitters)
-        if count <= MOST_LAMPS:
-            return self._emitters, 1.0
-        chosen = ((np.arange(MOST_LAMPS) + frame.uniform("beams/choose")) * count / MOST_LAMPS).astype(int)
-        return [self._emitters[k] for k in chosen], count / MOST_LAMPS
 
     def release(self) -> None:
         self._sources.release()
