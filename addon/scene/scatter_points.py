@@ -9,7 +9,16 @@ points, and many samples see all of the cloud.
 Cells stand along a curve through space, 64 to a row of the image; a row has a bounding sphere, so that pixels pass over
 rows which are too far away. Objects begin with a row of their own.
 
-Made on the CPU when geometry or what scatters changes: 40 us a cell. On the GPU: 2 images of 16 bytes a cell and run.
+A mesh whose parts are closed has points on its outside, told by their volumes. An open part is a sheet with two sides
+(mesh_parts.py): such an instance is two objects, one of each side, with the points of its closed parts in both, and a
+pixel belongs to that which it sees. Points lie as densely as the profile asks, and where an object is thinner than
+that, as its mean thickness does (4 volume / surface).
+
+Where a ray through an object leaves it, `near` tells the cell: a grid of voxels around the instance, each with the cell
+of the nearest point that faces along either way of each axis (6 numbers in 2 texels).
+
+Made on the CPU when geometry or what scatters changes: 40 us a cell. On the GPU: 2 images of 16 bytes a cell and run,
+and up to 32 bytes for each of 64^3 voxels an instance.
 
 Bias: the cloud is finite: what lies between its points (a seventh of a cell) is never lit itself.
 """
@@ -21,30 +30,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gfx import images
-from ..kernels.morton import morton_codes
 from ..materials import translucency
 from ..materials.translucency import maps_of
 from ..materials.working_space import current
-from ..sampling.sequence import bits
-from ..snapshot.scene import Instance, Mesh, Snapshot
-from .pieces import farthest, octahedral
+from ..snapshot.scene import Instance, Snapshot
+from .pieces import octahedral
+from .scatter_surface import ROW, RUNS, Surface, Voxels
 
-ROW = 64  # cells
-RUNS = 8  # points of the cloud for each cell
 FEWEST = 64  # cells of an object
-TURN = 0.7  # cell sizes by which two opposite faces count as apart
-SPACING = 0.7  # of the longest scale of the profile: how far apart points are wished
+SPACING = 0.7  # of the longest scale of the profile, or the mean thickness: how far apart points are wished
 
 
 @dataclass(frozen=True)
 class ScatteringObject:
-    """An instance that scatters: its row in the image of instances, rows of cells, distance between cells, m."""
+    """An instance that scatters, or one side of it: its row in the image of instances, rows of cells, distance between
+    cells, m, and mean thickness, m."""
 
     instance: int
     first_row: int
     rows: int
     spacing: float
     area: float
+    thickness: float
 
 
 class ScatterPoints:
@@ -59,7 +66,9 @@ class ScatterPoints:
         self._entries: list[images.Image] = []  # by run: painted tint and translucency
         self.cells: list[images.Image] = []  # by run: place, w = area of the cell, m2
         self.bounds: images.Image | None = None  # by row: centre and radius
-        self.table: images.Image | None = None  # by row of instances: 1 + number of the object, or 0; then the objects
+        # By row of instances: 1 + number of the object in front, or 0, and of that behind; then the objects.
+        self.table: images.Image | None = None
+        self.near: images.Image | None = None  # voxels: 1 + number of the cell that faces +x, -x, +y; -y, +z, -z
 
     def update(self, frame, most: int) -> bool:
         """Make points anew if surfaces moved or scatter otherwise; True if so. At most `most` cells in all."""
@@ -93,33 +102,36 @@ class ScatterPoints:
         self, snapshot: Snapshot, placed: list[Instance], shown: list[int], reach: tuple, maps: list,
         origin: np.ndarray, most: int,
     ) -> None:  # fmt: skip
-        surfaces = [_Surface.of(placed[k], snapshot.meshes[placed[k].mesh], reach, origin) for k in shown]
-        wished = np.array([one.area / max(SPACING * one.reach, 1e-30) ** 2 for one in surfaces])
-        wished = np.maximum(np.nan_to_num(wished, posinf=1e12), FEWEST)
-        if wished.sum() > most:
-            # What is left of a few large wishes goes to those.
-            fair = np.sort(wished)
-            before = np.concatenate([[0.0], np.cumsum(fair)[:-1]])
-            caps = (most - before) / np.arange(len(fair), 0, -1)
-            fits = np.flatnonzero(caps <= fair)
-            wished = np.minimum(wished, max(caps[fits[0]], 1.0) if len(fits) else wished)
-        counts = np.maximum(np.ceil(wished / ROW).astype(int) * ROW, ROW)
-        if counts.sum() > most:  # a row each is too much: what comes first has one
-            counts[np.cumsum(counts) > most] = 0
+        sides = []
+        for k in shown:
+            sides += [(k, one) for one in Surface.sides(placed[k], snapshot.meshes[placed[k].mesh], reach, origin)]
+        counts = _counts([one for _, one in sides], most)
         self.objects, blocks, row = [], [], 0
         table = np.zeros((max(len(placed), 1), 4), np.float32)
-        for k, surface, count in zip(shown, surfaces, counts):
+        clouds: dict[int, list] = {}
+        for (k, surface), count in zip(sides, counts):
             if not count or not surface.area > 0.0:
                 continue
-            *block, triangle, uv = surface.cells(int(count))
+            *block, triangle, uv, cloud = surface.cells(int(count))
             blocks.append((*block, _painted(surface.materials[triangle], uv, maps, snapshot.images)))
             spacing = float(np.sqrt(surface.area / count))
-            self.objects.append(ScatteringObject(k, row, int(count) // ROW, spacing, surface.area))
-            table[k] = len(self.objects), 0.0, 0.0, 0.0
-            row += int(count) // ROW
+            rows = int(count) // ROW
+            self.objects.append(ScatteringObject(k, row, rows, spacing, surface.area, surface.thickness))
+            table[k, int(surface.behind) : 2] = len(self.objects)
+            clouds.setdefault(k, []).append((*cloud, row * ROW, spacing))
+            row += rows
+        grids = {k: Voxels.of(found) for k, found in clouds.items()}
+        starts = dict(zip(grids, np.cumsum([0] + [len(grid.texels) for grid in grids.values()])))
+        listed = []
+        for one in self.objects:
+            grid = grids[one.instance]
+            listed += [(one.first_row, one.rows, one.spacing, one.instance), (*grid.low, grid.size)]
+            listed += [(*grid.shape, starts[one.instance])]
         self.rows = row
-        listed = np.array([(o.first_row, o.rows, o.spacing, 0.0) for o in self.objects], np.float32).reshape(-1, 4)
-        self.table = images.upload_list(np.concatenate([table, listed]))
+        objects = np.array(listed, np.float32).reshape(-1, 4)
+        self.table = images.upload_list(np.concatenate([table, objects]))
+        texels = [grid.texels for grid in grids.values()]
+        self.near = images.upload_list(np.concatenate(texels) if texels else np.zeros((0, 4)))
         self.first_object = len(table)
         self._upload(blocks)
 
@@ -147,89 +159,22 @@ class ScatterPoints:
         self.__init__()
 
 
-@dataclass(frozen=True)
-class _Surface:
-    """Triangles of an instance that scatter: corners and corner normals (T, 3, 3), areas (T,), texture coordinates
-    (T, 3, 2), numbers of materials (T,), and how far light spreads, m."""
-
-    corners: np.ndarray
-    normals: np.ndarray
-    areas: np.ndarray
-    uv: np.ndarray
-    materials: np.ndarray
-    reach: float
-
-    @property
-    def area(self) -> float:
-        return float(self.areas.sum())
-
-    @classmethod
-    def of(cls, instance: Instance, mesh: Mesh, reach: tuple, origin: np.ndarray) -> _Surface:
-        material = mesh.triangle_materials(instance.materials)
-        of_triangle = np.asarray(reach)[material]
-        shown = mesh.triangle_corners[of_triangle > 0.0]
-        linear, moved = instance.matrix[:3, :3], instance.matrix[:3, 3] - origin
-        corners = mesh.positions[mesh.corner_vertices[shown]].astype(np.float64) @ linear.T + moved
-        a, b, c = linear.T
-        turn = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-        normals = mesh.corner_normals[shown].astype(np.float64) @ turn.T
-        if np.linalg.det(linear) < 0.0:
-            normals = -normals
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        areas = np.linalg.norm(across, axis=1) / 2
-        # Normals of a shell that is inside out are turned round, as the viewer's side turns those of pixels.
-        facing = np.einsum("ni,ni->n", across, normals.sum(axis=1))
-        across = across * np.where(facing < 0.0, -1.0, 1.0)[:, None]
-        middle = corners.mean(axis=1)
-        volume = float(np.einsum("ni,ni->", middle - middle.mean(axis=0), across)) / 6.0 if len(middle) else 0.0
-        if volume < -1e-3 * float(areas.sum()) ** 1.5:
-            normals = -normals
-        finite = np.isfinite(corners).all(axis=(1, 2)) & np.isfinite(areas)
-        positive = of_triangle[of_triangle > 0.0]
-        layer = mesh.uv_maps.get(mesh.active_uv)
-        uv = np.zeros((len(shown), 3, 2)) if layer is None else layer[shown].astype(np.float64)
-        own = material[of_triangle > 0.0]
-        return cls(
-            corners[finite],
-            normals[finite],
-            areas[finite],
-            uv[finite],
-            own[finite],
-            float(positive.min()) if len(positive) else 0.0,
-        )
-
-    def cells(self, count: int) -> tuple[np.ndarray, ...]:
-        """Points (count, RUNS, 3), shading normals and triangles' normals of the same shape, areas (count,), numbers of
-        triangles (count, RUNS) and texture coordinates (count, RUNS, 2)."""
-        place, normal, face, triangle, uv = self._cloud(count * RUNS)
-        size = np.sqrt(self.area / count)
-        centre, owner = farthest(np.concatenate([place, TURN / 2 * size * face], axis=1).astype(np.float32), count)
-        sums = np.bincount(owner, minlength=count)
-        order = np.argsort(owner, kind="stable")
-        first = np.concatenate([[0], np.cumsum(sums)[:-1]])
-        # The centre, then others evenly out of its cell.
-        spread = (bits(np.arange(RUNS), 0) * sums[:, None] // 2**32).astype(np.int64)
-        member = order[np.minimum(first[:, None] + spread, len(order) - 1)]
-        member[:, 0] = centre
-        along = np.argsort(morton_codes(place[centre]), kind="stable")
-        member, sums = member[along], sums[along]
-        areas = sums * (self.area / len(place))
-        return place[member], normal[member], face[member], areas, triangle[member], uv[member]
-
-    def _cloud(self, count: int) -> tuple[np.ndarray, ...]:
-        """Evenly spread points, with shading normals, those of their triangles, the triangles' numbers and texture
-        coordinates."""
-        edges = np.concatenate([[0.0], np.cumsum(self.areas)])
-        u, v, w = (bits(np.arange(count), dimension) / 2.0**32 for dimension in range(3))
-        triangle = np.clip(np.searchsorted(edges, u * edges[-1], side="right") - 1, 0, len(self.areas) - 1)
-        root = np.sqrt(v)
-        share = np.stack([1 - root, root * (1 - w), root * w], axis=1)[:, :, None]
-        corners = self.corners[triangle]
-        normal = _unit((share * self.normals[triangle]).sum(axis=1))
-        face = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-        face *= np.where((face * normal).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
-        normal = np.where((normal * normal).sum(axis=1, keepdims=True) > 0.5, normal, face)
-        return (share * corners).sum(axis=1), normal, face, triangle, (share * self.uv[triangle]).sum(axis=1)
+def _counts(surfaces: list[Surface], most: int) -> np.ndarray:
+    """Cells of each object, whole rows, at most `most` in all."""
+    wished = np.array([one.area / max(SPACING * min(one.reach, one.thickness), 1e-30) ** 2 for one in surfaces])
+    wished = np.maximum(np.nan_to_num(wished, posinf=1e12), FEWEST)
+    wished = np.maximum(wished * np.array([one.share for one in surfaces]), ROW)
+    if wished.sum() > most:
+        # What is left of a few large wishes goes to those.
+        fair = np.sort(wished)
+        before = np.concatenate([[0.0], np.cumsum(fair)[:-1]])
+        caps = (most - before) / np.arange(len(fair), 0, -1)
+        fits = np.flatnonzero(caps <= fair)
+        wished = np.minimum(wished, max(caps[fits[0]], 1.0) if len(fits) else wished)
+    counts = np.maximum(np.ceil(wished / ROW).astype(int) * ROW, ROW)
+    if counts.sum() > most:  # a row each is too much: what comes first has one
+        counts[np.cumsum(counts) > most] = 0
+    return counts
 
 
 def _painted(material: np.ndarray, uv: np.ndarray, maps: list, pictures: dict) -> np.ndarray:
@@ -244,10 +189,6 @@ def _painted(material: np.ndarray, uv: np.ndarray, maps: list, pictures: dict) -
                 color = translucency.sampled(pictures[image], uv[own])
                 out[own, 3] = np.clip(color @ current().luminance, 0.0, 1.0)
     return out
-
-
-def _unit(v: np.ndarray) -> np.ndarray:
-    return v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-30)
 
 
 def _image(values: np.ndarray) -> images.Image:

@@ -8,7 +8,6 @@
 #include "subsurface/image.glsl"
 #include "subsurface/profile.glsl"
 
-#define ROW 64
 #define LEAST_COLOR 1e-5  // what is darker tells nothing of the light that arrives
 #define GOLDEN 2.39996323
 #define LITTLE 0.01  // of the far light's share: where points bring less, pixels nearby stand in
@@ -224,7 +223,7 @@ void main()
   vec3 direct = own.direct;
   vec3 indirect = own.indirect;
   float code = floor(share.w * 0.25);
-  int place = first_object + int(code) - 1;
+  int place = first_object + OBJECT_TEXELS * (int(code) - 1);
   vec4 object = scatter_objects_fetch(ivec2(place & 2047, place >> 11));
   float reach = profile_reach(profile);
   if (reach > width) {  // else all of it lies within the pixel

@@ -7,6 +7,9 @@
 //   entry   painted: tint of the light that enters here; w: how translucent the surface is here
 #include "lib/math.glsl"
 
+#define ROW 64           // cells of an object in a row of images of points (addon/scene/scatter_points.py)
+#define OBJECT_TEXELS 3  // first row, rows, spacing in m, instance; the grid's corner, voxel's size; its voxels, first texel
+
 float scatter_code(int object, int method, float entry)
 {
   return float(object * 4 + method) + clamp(entry, 0.0, 1.0) * 0.99;

@@ -27,7 +27,8 @@ void main()
   Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);
   closures_end(c);
-  int object = int(scatter_objects_fetch(ivec2(instance_flat.x & 2047, instance_flat.x >> 11)).x + 0.5);
+  vec4 sides = scatter_objects_fetch(ivec2(instance_flat.x & 2047, instance_flat.x >> 11));
+  int object = int((point.backfacing ? sides.y : sides.x) + 0.5);
   float most = max_component(c.scatter);
   if (object == 0 || !(most > 0.0)) {
     discard;

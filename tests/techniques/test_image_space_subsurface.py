@@ -334,3 +334,20 @@ def test_where_nothing_is_translucent_it_is_diffuse_and_gives_nothing(stage):
     assert shown(_painted_plane(stage, translucency_map=mask)) == pytest.approx(
         np.broadcast_to(COLOR, (32, 32, 3)), abs=1e-5
     )
+
+
+@pytest.mark.parametrize("bend", [-0.4, 0.4])
+def test_an_open_sheet_is_the_same_on_either_side_and_as_in_cycles(stage, bend):
+    """It bends up or down, so that its signed volume, which means nothing, has either sign."""
+    pictures = []
+    for winding in (1, -1):
+        stage.clear()
+        grid = np.linspace(-1, 1, 9)
+        corners = [(x, y, bend * x * x) for y in grid for x in grid]
+        faces = [(k, k + 1, k + 10, k + 9)[::winding] for k in range(71) if k % 9 < 8]
+        stage.mesh(corners, faces, material=scattering(stage, "RANDOM_WALK", 0.05))
+        stage.light("SUN", energy=np.pi)
+        stage.camera_above(0.8)
+        pictures.append(shown(stage.render(4)).mean(axis=(0, 1)))
+    assert pictures[0] == pytest.approx(pictures[1], rel=0.01)
+    assert pictures[0] == pytest.approx(shown(stage.render(64, engine="CYCLES")).mean(axis=(0, 1)), rel=0.06)
