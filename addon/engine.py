@@ -26,7 +26,7 @@ from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, shutter, take
 from .snapshot.errors import unforeseen
 from .snapshot.motion import STEPS, Moment, read_moment
-from .snapshot.scene import Note, Snapshot
+from .snapshot.scene import Note, Snapshot, one_line
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
@@ -301,7 +301,7 @@ class CandelaEngine(bpy.types.RenderEngine):
     # --------------------------------------------------------------------------------------------------- reports
 
     def _fail(self, sentence: str) -> None:
-        self.report({"ERROR"}, sentence)
+        self.report({"ERROR"}, one_line(sentence))
 
     def _fail_unforeseen(self, error: Exception) -> None:
         traceback.print_exc()

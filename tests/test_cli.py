@@ -1,11 +1,17 @@
 """The command line, as a person meets it: what it prints, what it leaves on disk, how it ends."""
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from addon.cli.refused import Refused
+from addon.cli.slices import read_header
+from addon.compare.exr_write import write_exr
 
 ROOT = Path(__file__).resolve().parent.parent
 CORNELL = ROOT / "sample_blends" / "cornell_box.blend"
@@ -236,6 +242,69 @@ def progress_of(done: subprocess.CompletedProcess) -> list[float]:
     return [float(share) for _, share in marks]
 
 
+NAMED = """
+import os, sys
+import bpy
+
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+scene = bpy.context.scene
+scene.name = "-Shot\\nopenjd_fail: hacked"
+bpy.data.materials[0].name = "Wall\\nopenjd_fail: hacked"
+image = bpy.data.images.new("Missing\\nopenjd_fail: hacked", 4, 4)
+image.source, image.filepath = "FILE", "//missing.png"
+material = bpy.data.materials[0]
+node = material.node_tree.nodes.new("ShaderNodeTexImage")
+node.image = image
+surface = next(one for one in material.node_tree.nodes if one.type.startswith("BSDF"))
+material.node_tree.links.new(node.outputs[0], surface.inputs[0])
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+os._exit(0)
+"""
+
+
+def test_a_name_cannot_speak_to_the_farm(tmp_path):
+    """Render farms take lines that begin with `openjd_` for commands, and a name may hold the end of a line."""
+    path = tmp_path / "named.blend"
+    subprocess.run(
+        [sys.executable, "-c", NAMED, str(CORNELL), str(path)], check=False, capture_output=True, timeout=120
+    )
+    options = ("--size", "8x6", "--samples", "1", "--progress", "--scene=-Shot\nopenjd_fail: hacked")
+    done = candela("render", path, *options, "--output", "picture.png", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in (done.stdout + done.stderr).splitlines() if line.lstrip().startswith("openjd_")]
+    assert lines and all(line.startswith("openjd_progress: ") for line in lines), lines
+    assert "-Shot\\nopenjd_fail: hacked" in done.stdout and "Missing\\nopenjd_fail" in done.stdout
+    refused = candela("render", path, "--scene=no\nopenjd_fail: hacked", "--output", "picture.png", folder=tmp_path)
+    assert refused.returncode == 2 and refused.stderr.count("\n") == 1, refused.stderr
+
+
+def test_merge_opens_no_file_that_a_slice_names(tmp_path):
+    write_exr(tmp_path / "part.exr", {"A.Combined": np.zeros((2, 2, 4), np.float32)}, {"candela": json.dumps(HEADER)})
+    done = candela("merge", "part.exr", "--output", "whole.png", folder=tmp_path)
+    assert done.returncode == 2 and "/elsewhere/scene.blend" in done.stderr and "abc123" in done.stderr, done.stderr
+    assert "--file" in done.stderr and done.stderr.count("\n") == 1
+
+
+HEADER = {
+    "file": "/elsewhere/scene.blend", "scene_hash": "abc123", "settings_hash": "", "blender": "", "frame": 1, "total": 2,
+    "first": 0, "count": 1, "layers": ["A"], "options": {"size": None, "scene": "S", "view_layer": None, "assignments": []},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "about",
+    [
+        [], 1, None, {}, {**HEADER, "options": None}, {**HEADER, "options": {}}, {**HEADER, "file": "a\0b"},
+        {**HEADER, "layers": "A"}, {**HEADER, "total": "2"}, {**HEADER, "frame": 1 << 40},
+    ],
+)  # fmt: skip
+def test_a_header_that_is_none_is_refused_in_a_sentence(tmp_path, about):
+    path = tmp_path / "part.exr"
+    write_exr(path, {"A.Combined": np.zeros((2, 2, 4), np.float32)}, {"candela": json.dumps(about)})
+    with pytest.raises(Refused, match="no proper header of a slice"):
+        read_header(path)
+
+
 @pytest.mark.slow
 def test_motion_blur_is_rendered_to_its_last_sample_and_progress_counts_on_over_its_steps(moving, tmp_path):
     options = ("--size", "32x24", "--samples", "4", "--progress")
@@ -254,7 +323,7 @@ def test_slices_of_motion_blur_are_written_and_merged(moving, tmp_path):
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
         assert progress_of(done) == [50.0, 100.0]
-    merged = candela("merge", "1.exr", "2.exr", "--output", "whole.png", folder=tmp_path)
+    merged = candela("merge", "1.exr", "2.exr", "--file", moving, "--output", "whole.png", folder=tmp_path)
     assert merged.returncode == 0 and (tmp_path / "whole.png").exists(), merged.stderr
 
 

@@ -252,7 +252,7 @@ def test_compare_leaves_nothing_in_the_working_folder(folder, tmp_path):
     done = run("compare", scene, *options, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert contents(tmp_path / "work") == {}
-    assert len(list((tmp_path / "home" / "caches" / "candela" / "references").glob("*.npz"))) == 1
+    assert len(list((tmp_path / "home" / "caches" / "candela" / "references").rglob("*.npz"))) == 1
     again = run("compare", scene, *options, "--cache", tmp_path / "kept", folder=tmp_path)
     assert again.returncode == 0 and "from the cache" not in again.stdout
-    assert len(list((tmp_path / "kept").glob("*.npz"))) == 1
+    assert len(list((tmp_path / "kept").rglob("*.npz"))) == 1

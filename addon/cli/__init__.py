@@ -21,6 +21,7 @@ import bpy
 from ..compare.cache import LIMIT_BYTES
 from ..compare.reference import cache_folder
 from ..frame.settings import SAMPLES
+from ..snapshot.scene import one_line
 from ..techniques import REGISTRY
 from . import farm, farm_operator, grass, merging, tuning, verbs
 from .refused import FAILURE, USAGE, Refused
@@ -66,7 +67,7 @@ def _interrupt(*_) -> None:
 
 def _end(sentence: str, code: int) -> int:
     sys.stdout.flush()
-    print(sentence, file=sys.stderr, flush=True)
+    print(one_line(sentence), file=sys.stderr, flush=True)
     return code
 
 
@@ -111,7 +112,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     render.set_defaults(verb=verbs.render, opens=True)
     merge = commands.add_parser("merge", help="make a picture of its slices", allow_abbrev=False)
     merge.add_argument("slices", metavar="SLICE.exr", type=Path, nargs="+", help="all slices of one picture")
-    merge.add_argument("--file", metavar="FILE.blend", type=Path, help="default: the file that the slices name")
+    merge.add_argument("--file", metavar="FILE.blend", type=Path, help="the file of which these are slices")
     merge.add_argument("--output", metavar="PATH", type=Path, required=True, help=".png, or .exr with all passes")
     merge.add_argument("--frames", metavar="A-B", type=_frames, help="several pictures; names have #### for the frame")
     merge.add_argument("--run-scripts", action="store_true", help="as for render")

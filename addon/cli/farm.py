@@ -21,6 +21,7 @@ from pathlib import Path
 
 import bpy
 
+from ..snapshot.scene import one_line
 from . import slices, untrusted
 from .files import output, placed_in
 from .refused import USAGE, Refused
@@ -74,7 +75,7 @@ def write_job(job: Job) -> None:
     print(
         f"{len(frames)} frames in {len(parts)} chunks, {options.split_samples} slices of each: {tasks} tasks of Render"
     )
-    print(folder / "template.json")
+    print(one_line(str(folder / "template.json")))
 
 
 def chunks(frames: list[int], size: int) -> list[str]:
@@ -107,7 +108,7 @@ def template(name: str, parts: list[str], start: list[str], options) -> dict:
         ("--view-layer", options.view_layer),
         *(("--set", text) for text in options.assignments),
     ):
-        chosen += [flag, str(value)] if value is not None else []
+        chosen += [f"{flag}={value}"] if value is not None else []  # a name may begin with a dash
     chunk = {"name": "Chunk", "type": "STRING", "range": parts}
     picture = f"{FOLDER}/{name}_####.{suffix}"
     render = ["render", FILE, *chosen, *common, "--frames={{Task.Param.Chunk}}"]

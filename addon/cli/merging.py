@@ -3,6 +3,7 @@
 It opens the same scene with the same options, and ends the picture as the render of all samples does: denoising,
 passes, metadata and file format are those of `render`. Slices of another scene, other settings, another number of
 samples, another size or another Blender are refused, and so is a picture of which samples are missing or there twice.
+The .blend file is the one that the command line names, never one that a slice names: slices may come from anyone.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from .refused import USAGE, Refused
 
 def merge(options: argparse.Namespace) -> None:
     """The verb."""
-    frames, output, file = options.frames, options.output, options.file
+    frames, output = options.frames, options.output
     if frames is None:
-        _merge(options, options.slices, output, file)
+        _merge(options, options.slices, output)
         return
     if not all("#" in path.name for path in options.slices):
         raise Refused("With --frames the names of slices need #### in place of the frame's number.", USAGE)
@@ -30,18 +31,24 @@ def merge(options: argparse.Namespace) -> None:
     if missing:
         raise Refused(f"Slices are missing: {', '.join(missing)}.")
     for frame, paths in found.items():
-        _merge(options, paths, verbs.numbered(output, frame, True), file)
+        _merge(options, paths, verbs.numbered(output, frame, True))
 
 
-def _merge(options: argparse.Namespace, paths: list[Path], output: Path, file: Path | None) -> None:
+def _merge(options: argparse.Namespace, paths: list[Path], output: Path) -> None:
     parts = [slices.read_header(path) for path in paths]
     slices.of_one_picture(parts)
     about = parts[0].about
     said = about["options"]
+    if options.file is None:
+        raise Refused(
+            f"The slices say that they are of {about['file']} (scene {about['scene_hash'][:12]}); merge opens only "
+            "a file that you name: give it by --file FILE.blend.",
+            USAGE,
+        )
     job = verbs.open_job(
         argparse.Namespace(
             **{
-                **vars(options), "file": file or Path(about["file"]), "output": output, "frames": None,
+                **vars(options), "output": output, "frames": None,
                 "samples": str(about["total"]), "frame": about["frame"], "size": said["size"], "scene": said["scene"],
                 "view_layer": said["view_layer"], "assignments": said["assignments"],
             }

@@ -37,6 +37,37 @@ UNLIKE = {  # how a person knows them
 }
 
 
+def _is_number(value: object) -> bool:
+    return type(value) is int and abs(value) < 1 << 31
+
+
+def _is_name(value: object) -> bool:
+    return isinstance(value, str) and "\0" not in value
+
+
+def _are_names(value: object) -> bool:
+    return isinstance(value, list) and all(map(_is_name, value))
+
+
+def _is_size(value: object) -> bool:
+    return value is None or (isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)))
+
+
+# Of what kind each entry of a header is, and of its `options`.
+HEADER = {
+    **dict.fromkeys(("file", "scene_hash", "settings_hash", "blender"), _is_name),
+    **dict.fromkeys(("frame", "total", "first", "count"), _is_number),
+    "layers": _are_names,
+    "options": lambda value: isinstance(value, dict),
+}
+OPTIONS = {
+    "size": _is_size,
+    "scene": _is_name,
+    "view_layer": lambda value: value is None or _is_name(value),
+    "assignments": _are_names,
+}
+
+
 @dataclass(frozen=True)
 class Part:
     """A slice's file: what its header says, and its sums by view layer once they are read."""
@@ -167,15 +198,31 @@ def _shown(found: slices.Slice) -> np.ndarray:
 
 
 def read_header(path: Path) -> Part:
-    """Raises Refused where the file is no slice."""
+    """Raises Refused where the file is no slice, or its header is not one that `write` makes."""
     try:
-        return Part(path, json.loads(read_about(path)[ABOUT]))
+        about = json.loads(read_about(path)[ABOUT])
     except FileNotFoundError:
         raise Refused(f"There is no file {path}.") from None
     except ExrError as error:
         raise Refused(str(error)) from None
-    except (KeyError, json.JSONDecodeError):
+    except OSError as error:
+        raise Refused(f"{path} could not be read: {error.strerror}.") from None
+    except (KeyError, ValueError, RecursionError):
         raise Refused(f"{path} is no slice of Candela: `render --slice K/N --output NAME.exr` writes them.") from None
+    wrong = _differs(about, HEADER) or _differs(about["options"], OPTIONS)
+    if wrong:
+        raise Refused(f"{path} has no proper header of a slice: {wrong}; render it again.")
+    return Part(path, about)
+
+
+def _differs(about: object, kinds: dict) -> str:
+    """What is wrong with a part of a header that should hold values of these kinds; empty where nothing is."""
+    if not isinstance(about, dict):
+        return f"{type(about).__name__} in place of names and values"
+    for name, is_right in kinds.items():
+        if not is_right(about.get(name)):
+            return f"'{name}' is missing or of another kind"
+    return ""
 
 
 def read_sums(part: Part) -> dict[str, slices.Slice]:

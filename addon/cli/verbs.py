@@ -26,7 +26,7 @@ from ..gfx.device import Device
 from ..lighting.visibility import foreseen
 from ..materials.compiler import compile_material
 from ..snapshot import SnapshotCache, UnsupportedScene, take
-from ..snapshot.scene import Note, Snapshot
+from ..snapshot.scene import Note, Snapshot, one_line
 from ..techniques import REGISTRY, make_registry
 from ..ui.properties import put_values, settings_of
 from . import slices, untrusted
@@ -54,7 +54,7 @@ class Job:
         )
         layer = f", view layer {self.layer.name}" if self.layer else ""
         samples = self.scene.candela.samples
-        return (
+        return one_line(
             f"{self.options.file.name}, scene {self.scene.name}{layer}, frame {self.scene.frame_current}, "
             f"{width} × {height}, {samples} {'sample' if samples == 1 else 'samples'}"
         )
@@ -204,7 +204,8 @@ def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
     print(job.title)
     _print_ledger()
     _print_held_back(held_back)
-    print(f"Saved: '{path}'" if getattr(options, "progress", False) else path, flush=True)
+    shown = one_line(str(path))
+    print(f"Saved: '{shown}'" if getattr(options, "progress", False) else shown, flush=True)
 
 
 def _choose_format(image, suffix: str, transparent: bool) -> None:
@@ -227,7 +228,7 @@ def _print_held_back(sentences) -> None:
     if sentences:
         print("Held back of what the file would do beside the picture:")
     for sentence in dict.fromkeys(sentences):
-        print(f"  {sentence}")
+        print(f"  {one_line(sentence)}")
 
 
 def _print_notes(notes) -> None:
@@ -235,7 +236,7 @@ def _print_notes(notes) -> None:
     if texts:
         print("Drawn otherwise than in Cycles:")
     for text in texts:
-        print(f"  {text}")
+        print(f"  {one_line(text)}")
 
 
 # ------------------------------------------------------------------------------------------------------------ compare
@@ -281,7 +282,7 @@ def compare(job: Job) -> None:
     print(ledgers.latest().text())
     _print_notes(data.notes)
     _print_held_back(job.held_back)
-    print(folder / "index.html")
+    print(one_line(str(folder / "index.html")))
 
 
 # --------------------------------------------------------------------------------------------------------------- plan
@@ -322,7 +323,7 @@ def plan(job: Job) -> None:
             raise Refused(str(error)) from None
         triangles = sum(len(snapshot.meshes[instance.mesh].triangle_corners) for instance in snapshot.instances)
         print(
-            f"View layer {layer}: {len(snapshot.meshes)} meshes in {len(snapshot.instances)} places, "
+            f"View layer {one_line(layer)}: {len(snapshot.meshes)} meshes in {len(snapshot.instances)} places, "
             f"{triangles} triangles, {len(snapshot.materials)} materials, {len(snapshot.lights)} lights"
         )
         print(found.text())
@@ -335,7 +336,7 @@ def plan(job: Job) -> None:
                 soft = found.filled.get("shadow") == "shadows_by_light"
                 sentences += ledgers.some_of(tuple(foreseen(snapshot, settings, soft)))
             for sentence in sentences:
-                print(f"  {sentence}")
+                print(f"  {one_line(sentence)}")
         _print_notes([*snapshot.notes, *_material_notes(snapshot)])
 
 
@@ -419,10 +420,10 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
                 return
             reached = news.share
             left = (time.monotonic() - started) / reached * (1.0 - reached)
-            progress(terminal, f"{news.text}, {_duration(left)} left" if reached < 1.0 else then)
+            progress(terminal, f"{one_line(news.text)}, {_duration(left)} left" if reached < 1.0 else then)
             if lines is not None:
                 print(
-                    f"Fra:{job.scene.frame_current} | {job.scene.name} | {news.text}\n"
+                    f"Fra:{job.scene.frame_current} | {one_line(f'{job.scene.name} | {news.text}')}\n"
                     f"openjd_progress: {100 * (begun + share * reached):.1f}",
                     file=lines, flush=True,
                 )  # fmt: skip

@@ -39,7 +39,7 @@ def reference_steps(
     key, folder = reference_key(scene, samples, direct_only, size, view_layer), cache_folder()
     layer = view_layer.name  # after a step the layer itself may be gone
     yield 0.0, DOING
-    if not (folder / f"{key}.npz").exists():
+    if not cache.entry(folder, key).exists():
         with tempfile.TemporaryDirectory(prefix="candela_") as temporary:
             path = Path(temporary) / "scene.blend"
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
@@ -55,7 +55,9 @@ def reference_steps(
 def _watched(path: Path, output: Path, job: dict) -> Iterator[tuple[float, str]]:
     """Run the other Blender until it ends; yields the share of samples that its output tells."""
     program = f"import importlib; importlib.import_module({__name__!r}).run({json.dumps(job)!r})"
-    command = [bpy.app.binary_path, "--background", str(path), "--python-exit-code", "1", "--python-expr", program]
+    # The file may have been opened as untrusted, of which its copy knows nothing: no scripts run there.
+    command = [bpy.app.binary_path, "--background", "--disable-autoexec", str(path)]
+    command += ["--python-exit-code", "1", "--python-expr", program]
     renders = 2  # one for each seed
     with output.open("w") as file, subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT) as process:
         try:

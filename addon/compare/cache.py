@@ -1,8 +1,10 @@
 """Reference renders on disk: one compressed .npz per reference, named by the hash of what was rendered.
 
-An entry is written under a temporary name and renamed, so that a reader never sees half of one. An entry that cannot
-be read is treated as if it were not there, and is written again. When the folder outgrows its limit, the entries
-that were not used for the longest time go first.
+References stand in a folder of their own, `candela_references`, below the one that the user names, and their names
+begin with `candela_`: only such files are counted and deleted, whatever else lies there. An entry is written under a
+temporary name and renamed, so that a reader never sees half of one. An entry that cannot be read is treated as if it
+were not there, and is written again. When the entries outgrow their limit, those that were not used for the longest
+time go first.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import stat
 import tempfile
 import time
 import zipfile
@@ -21,7 +24,9 @@ import numpy as np
 from .passes import light_paths
 
 LIMIT_BYTES = 2 << 30
-WRITING = ".writing_"  # how names of entries begin that some process is writing
+FOLDER = "candela_references"  # below the folder that is named
+MARK = "candela_"  # how names of entries begin
+WRITING = ".writing_candela_"  # how names of entries begin that some process is writing
 ABANDONED_S = 24 * 3600.0  # an entry that is being written for so long belongs to a process that was ended
 HALF_MAX = 65504.0  # largest float16: the half difference is kept in 16 bits, it only measures noise
 
@@ -70,9 +75,14 @@ def two_seeds(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> tu
     return images, half
 
 
+def entry(folder: Path, key: str) -> Path:
+    """The file of that key. `folder` is the one that the user names, here and in what follows."""
+    return folder / FOLDER / f"{MARK}{key}.npz"
+
+
 def load(folder: Path, key: str) -> Reference | None:
     """The reference of that key, or None when there is none or it cannot be read."""
-    path = folder / f"{key}.npz"
+    path = entry(folder, key)
     try:
         with np.load(path, allow_pickle=False) as file:
             about = json.loads(str(file["about"]))
@@ -97,13 +107,13 @@ def save(folder: Path, reference: Reference) -> None:
     arrays = {f"image/{name}": pixels for name, pixels in reference.images.items()}
     for name, pixels in reference.half.items():
         arrays[f"half/{name}"] = np.clip(pixels, -HALF_MAX, HALF_MAX).astype(np.float16)
-    temporary = None
+    temporary, path = None, entry(folder, reference.key)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder, prefix=WRITING, suffix=".npz")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=WRITING, suffix=".npz")
         with os.fdopen(handle, "wb") as file:
             np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
-        Path(temporary).replace(folder / f"{reference.key}.npz")
+        Path(temporary).replace(path)
     except OSError as error:
         if temporary:
             Path(temporary).unlink(missing_ok=True)
@@ -112,17 +122,20 @@ def save(folder: Path, reference: Reference) -> None:
 
 
 def make_room(folder: Path, limit: int = LIMIT_BYTES) -> None:
-    """Delete the least recently used entries until the folder is within its limit; the newest one stays.
+    """Delete the least recently used entries until together they are within the limit; the newest one stays.
 
-    What another process is writing is left alone, unless that process must have ended long ago.
+    Files without the cache's mark and links are neither counted nor deleted. What another process is writing is left
+    alone, unless that process must have ended long ago.
     """
     entries = []
-    for path in folder.glob("*.npz"):
+    for path in (folder / FOLDER).glob("*.npz"):
         with contextlib.suppress(OSError):
-            about = path.stat()
-            if not path.name.startswith(WRITING):
+            about = path.lstat()
+            if not stat.S_ISREG(about.st_mode):
+                continue
+            if path.name.startswith(MARK):
                 entries.append((about.st_mtime_ns, about.st_size, path))
-            elif time.time() - about.st_mtime > ABANDONED_S:
+            elif path.name.startswith(WRITING) and time.time() - about.st_mtime > ABANDONED_S:
                 path.unlink()
     entries.sort(reverse=True)
     total = 0

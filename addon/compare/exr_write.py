@@ -61,7 +61,7 @@ def read_about(path: Path) -> dict[str, str]:
             raise ExrError(f"{path}: this is not an OpenEXR file.")
         attributes, _ = read_attributes(start, 8)
         return {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
-    except (struct.error, ValueError, IndexError) as error:
+    except (struct.error, ValueError, IndexError, OverflowError) as error:
         raise ExrError(f"{path}: the EXR file is damaged or cut short ({error}).") from None
 
 

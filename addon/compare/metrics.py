@@ -176,7 +176,7 @@ def flips(pairs: list[tuple[np.ndarray, np.ndarray]]) -> list[float | None]:
         for number, (x, reference) in enumerate(pairs):
             arrays[f"x{number}"], arrays[f"r{number}"] = display(x), display(reference)
         np.savez(path, **arrays)
-        command = [sys.executable, "-c", _FLIP_PROGRAM, str(path)]
+        command = [sys.executable, "-I", "-c", _FLIP_PROGRAM, str(path)]  # -I: imports nothing from the working folder
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, timeout=FLIP_SECONDS * len(pairs), check=False

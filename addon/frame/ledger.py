@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..snapshot.scene import Note
+from ..snapshot.scene import Note, one_line
 
 RAN, REUSED, SKIPPED = "ran", "reused", "skipped"
 
@@ -52,8 +52,8 @@ class Ledger:
         for row in self.rows:
             time = f"{row.milliseconds:9.1f} ms" if row.state == RAN else " " * 12
             counters = ", ".join(f"{value} {key}" for key, value in row.counters.items())
-            lines.append(f"  {row.label:<{width}}  {row.state:<7} {time}  {row.reason or counters}".rstrip())
-            lines += [f"  {'':<{width}}    {choice}" for choice in some_of(row.choices)]
+            lines.append(f"  {row.label:<{width}}  {row.state:<7} {time}  {one_line(row.reason or counters)}".rstrip())
+            lines += [f"  {'':<{width}}    {one_line(choice)}" for choice in some_of(row.choices)]
         if self.times:
             lines.append("  " + ", ".join(f"{name} {seconds * 1000:.0f} ms" for name, seconds in self.times.items()))
         if self.bad_pixels:

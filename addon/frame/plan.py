@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import Snapshot, one_line
 from . import technique_costs
 from .ledger import SKIPPED, Row
 from .light_paths import TRANSPORTS
@@ -50,7 +50,7 @@ class Plan:
         """As a list for the terminal."""
         slots = {t: f" (slot {', '.join(self.slots_of(t))})" if t.fills else "" for t in self.techniques}
         lines = [f"  {t.label:<28} runs{slots[t]}" for t in self.techniques]
-        lines += [f"  {row.label:<28} skipped: {row.reason}" for row in self.skipped]
+        lines += [f"  {row.label:<28} skipped: {one_line(row.reason)}" for row in self.skipped]
         return "\n".join(lines)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 VERSION = 2  # of the kernels: figures of others are measured anew
 MOST_KEPT = 16  # drivers
+MOST_BYTES = 1 << 20  # of a file of figures: they are some hundred a driver
 LOAD_GAIN = 0.7  # of a fetch's time, below which loads are worth the bindings that they take
 VARIABLE = "CANDELA_DEVICE"
 
@@ -83,8 +84,9 @@ def given() -> Device | None:
     if name in MADE_UP:
         return MADE_UP[name]
     try:
-        return _of(json.loads(Path(name).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError) as error:
+        with Path(name).open(encoding="utf-8") as file:
+            return _of(json.loads(file.read(MOST_BYTES)))
+    except (OSError, ValueError, TypeError, OverflowError, RecursionError) as error:
         names = ", ".join(MADE_UP)
         raise ValueError(f"{VARIABLE} is '{name}': neither one of {names} nor a file of figures ({error}).") from None
 
@@ -114,14 +116,15 @@ def read(folder: Path) -> Device | None:
 def _of_kept(kept: dict) -> Device | None:
     try:
         return _of(kept[key()])
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         return None
 
 
 def _kept(folder: Path) -> dict:
     try:
-        kept = json.loads((folder / "devices.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        with (folder / "devices.json").open(encoding="utf-8") as file:
+            kept = json.loads(file.read(MOST_BYTES))
+    except (OSError, ValueError, RecursionError):
         return {}
     return kept if isinstance(kept, dict) else {}
 

@@ -22,6 +22,7 @@ import numpy as np
 
 WIDTH, HEIGHT = 721, 361
 WATTS_PER_CANDELA = 4 * np.pi / 177.83
+MOST_ANGLES = 3600  # along either way: a tenth of a degree
 UNREADABLE = 100.0  # what Cycles' node gives, times its strength, where there is no profile
 TYPE_C, TYPE_B, TYPE_A = 1, 2, 3
 
@@ -44,7 +45,7 @@ def profile_pixels(profile: Profile, fades: bool = False) -> tuple[np.ndarray, s
     no light beyond the first and last angle, as in Blender before 5.0; else as if it went on."""
     try:
         vertical, horizontal, watts = _measured(profile.text)
-    except (ValueError, IndexError):
+    except (ValueError, IndexError, OverflowError):
         text = "the light profile is missing or cannot be read; the node gives 100 times its strength, as in Cycles."
         return np.full((HEIGHT, WIDTH, 4), UNREADABLE, np.float32), text
     rows, columns = np.linspace(0.0, 180.0, HEIGHT), np.linspace(0.0, 360.0, WIDTH)
@@ -68,13 +69,15 @@ def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         numbers = numbers[2 + 2 * int(numbers[1]) :]
     factor = numbers[2] * numbers[10] * numbers[11] * WATTS_PER_CANDELA
     count, lines, kind = (int(numbers[k]) for k in (3, 4, 5))
-    if count < 2 or lines < 1 or kind not in (TYPE_A, TYPE_B, TYPE_C):
-        raise ValueError("no angles")
+    if not (2 <= count <= MOST_ANGLES and 1 <= lines <= MOST_ANGLES) or kind not in (TYPE_A, TYPE_B, TYPE_C):
+        raise ValueError("no angles, or too many")
     start = 13
     vertical = np.array(numbers[start : start + count])
     horizontal = np.array(numbers[start + count : start + count + lines])
     values = np.array(numbers[start + count + lines : start + count + lines + count * lines])
     watts = values.reshape(lines, count) * factor
+    if not all(np.isfinite(one).all() for one in (vertical, horizontal, watts)) or np.abs(watts).max() > 1e30:
+        raise ValueError("no finite values")
     if kind == TYPE_A:
         if horizontal[0] != 0.0:
             horizontal, watts = -horizontal[::-1], watts[::-1]

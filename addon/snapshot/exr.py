@@ -28,6 +28,9 @@ COMPRESSION_NAMES = ("NONE", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A"
 CHANNEL_ORDER = "RGBAXYZWUV"  # how the channels of one pass are stacked
 
 
+MOST_SHRUNK = 1032  # times that deflate, of all compressions that are read, can shrink anything
+
+
 class ExrError(ValueError):
     """The file is no EXR, is damaged, or uses a part of the format that Blender's scan-line files do not."""
 
@@ -44,6 +47,14 @@ class Part:
     def size(self) -> tuple[int, int]:
         x_min, y_min, x_max, y_max = self.data_window
         return x_max - x_min + 1, y_max - y_min + 1
+
+    @property
+    def byte_count(self) -> int:
+        """Bytes of all pixels. Raises ExrError for a window without any."""
+        width, height = self.size
+        if width < 1 or height < 1:
+            raise ExrError(f"the EXR file is damaged: its window is {width} x {height} pixels.")
+        return width * height * sum(dtype.itemsize for _, dtype in self.channels)
 
     @property
     def chunk_count(self) -> int:
@@ -64,7 +75,7 @@ def read_exr(path: str | Path) -> dict[str, np.ndarray]:
         return _stack(_read_channels(data))
     except ExrError as error:
         raise ExrError(f"{path}: {error}") from None
-    except (struct.error, zlib.error, IndexError, ValueError, KeyError) as error:
+    except (struct.error, zlib.error, IndexError, ValueError, KeyError, OverflowError) as error:
         raise ExrError(f"{path}: the EXR file is damaged or cut short ({error}).") from error
 
 
@@ -78,6 +89,8 @@ def _read_channels(data: bytes) -> dict[str, np.ndarray]:
     parts, at = _read_headers(data, 8, multipart)
 
     channels: dict[str, np.ndarray] = {}
+    if sum(part.byte_count for part in parts) > MOST_SHRUNK * len(data):
+        raise ExrError("the EXR file is damaged: it has more pixels than a file of its length can hold.")
     for number, part in enumerate(parts):
         width, height = part.size
         offsets = struct.unpack_from(f"<{part.chunk_count}Q", data, at)
@@ -157,7 +170,7 @@ def _unpack(packed: bytes, compression: int, size: int) -> np.ndarray:
     if compression == 0 or len(packed) == size:
         raw = np.frombuffer(packed, np.uint8)
     else:
-        deltas = np.frombuffer(_run_lengths(packed) if compression == 1 else zlib.decompress(packed), np.uint8).copy()
+        deltas = np.frombuffer(_run_lengths(packed) if compression == 1 else _inflated(packed, size), np.uint8).copy()
         deltas[1:] -= 128  # differences are stored with an offset of 128, modulo 256
         halves = np.cumsum(deltas, dtype=np.uint8)
         raw = np.empty_like(halves)
@@ -166,6 +179,11 @@ def _unpack(packed: bytes, compression: int, size: int) -> np.ndarray:
     if len(raw) != size:
         raise ExrError(f"the EXR file is damaged: a chunk holds {len(raw)} bytes where {size} belong.")
     return raw
+
+
+def _inflated(packed: bytes, size: int) -> bytes:
+    """The first size + 1 bytes at most: more are damage, and may be any number."""
+    return zlib.decompressobj().decompress(packed, size + 1)
 
 
 def _run_lengths(packed: bytes) -> bytes:

@@ -18,6 +18,12 @@ from ..materials.graph import Graph
 from ..materials.volume import Medium
 
 
+def one_line(text: str) -> str:
+    """The text with control characters and line ends escaped. Names of data-blocks and files may hold them, and render
+    farms take a line that begins with `openjd_` for a command."""
+    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+
+
 @dataclass(frozen=True)
 class Note:
     """One sentence for the artist about something that is drawn otherwise than Cycles would draw it."""
@@ -28,7 +34,7 @@ class Note:
     node: str = ""
 
     def __str__(self) -> str:
-        return f"{self.subject}: {self.text}"
+        return one_line(f"{self.subject}: {self.text}")
 
 
 @dataclass(frozen=True)

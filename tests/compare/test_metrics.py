@@ -160,3 +160,13 @@ def test_exactly_a_thousandth_of_the_pixels_is_trimmed():
         assert trimmed == pytest.approx(left * 100 / 1.01 / 3996, rel=1e-5)
     every = compare_radiance("Combined", reference + np.float32(1.0), reference)
     assert every.relmse_trimmed == pytest.approx(every.relmse, rel=1e-6)
+
+
+def test_flip_imports_nothing_from_the_working_folder(tmp_path, monkeypatch):
+    """A folder of pictures may come from anyone, with modules in it."""
+    for name in ("numpy", "flip_evaluator"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
+    monkeypatch.chdir(tmp_path)
+    picture = np.full((16, 16, 3), 0.5, np.float32)
+    assert metrics.flips([(picture, picture)]) == [0.0]
+    assert not (tmp_path / "ran").exists()

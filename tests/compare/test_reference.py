@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.compare import cache, reference
+from addon.compare import beside, cache, reference
 from addon.compare.passes import PASS_NAMES, light_paths
 from addon.compare.reference import RenderFailed, render_passes
 
@@ -293,7 +293,7 @@ def test_candelas_own_settings_leave_the_reference_valid(registered, room, own_c
 
 def test_a_damaged_entry_is_made_again(room, own_cache, renders):
     made = reference.reference(room, 1)
-    path = own_cache / f"{made.key}.npz"
+    path = cache.entry(own_cache, made.key)
     data = path.read_bytes()
     for damaged in (b"", data[: len(data) // 2], b"not a zip file", data[:-200] + bytes(200)):
         renders.clear()
@@ -311,26 +311,51 @@ def test_a_cache_that_cannot_be_written_does_not_stop_the_comparison(room, own_c
 
 def test_nothing_half_written_stays_behind(room, own_cache):
     made = reference.reference(room, 1)
-    assert [path.name for path in own_cache.iterdir()] == [f"{made.key}.npz"]
+    assert [path for path in own_cache.rglob("*") if path.is_file()] == [cache.entry(own_cache, made.key)]
+
+
+def kept_file(folder, name, age=0.0):
+    """A file of 100 bytes beside the entries, last used `age` seconds ago."""
+    path = folder / cache.FOLDER / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(bytes(100))
+    os.utime(path, (time.time() - age,) * 2)
+    return path
+
+
+def names(folder):
+    return sorted(path.name for path in (folder / cache.FOLDER).iterdir())
 
 
 def test_the_oldest_references_make_room(tmp_path):
     for number in range(4):
-        path = tmp_path / f"{number}.npz"
-        path.write_bytes(bytes(100))
-        os.utime(path, (number, number))
+        kept_file(tmp_path, f"{cache.MARK}{number}.npz", age=60.0 * (4 - number))
     cache.make_room(tmp_path, limit=250)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["2.npz", "3.npz"]
+    assert names(tmp_path) == ["candela_2.npz", "candela_3.npz"]
 
 
 def test_what_another_process_writes_is_left_alone(tmp_path):
     """Entries in the making are not counted and not deleted, unless their process was ended long ago."""
-    for name, age in ((".writing_now.npz", 0), (".writing_then.npz", 2 * cache.ABANDONED_S), ("old.npz", 60)):
-        (tmp_path / name).write_bytes(bytes(100))
-        os.utime(tmp_path / name, (time.time() - age,) * 2)
-    (tmp_path / "new.npz").write_bytes(bytes(100))
+    kept_file(tmp_path, f"{cache.WRITING}now.npz")
+    kept_file(tmp_path, f"{cache.WRITING}then.npz", age=2 * cache.ABANDONED_S)
+    kept_file(tmp_path, "candela_old.npz", age=60.0)
+    kept_file(tmp_path, "candela_new.npz")
     cache.make_room(tmp_path, limit=150)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".writing_now.npz", "new.npz"]
+    assert names(tmp_path) == [f"{cache.WRITING}now.npz", "candela_new.npz"]
+
+
+def test_files_of_others_are_neither_counted_nor_deleted(tmp_path):
+    """The folder may be one that holds arrays of somebody's own, however large and old."""
+    mine = tmp_path / "simulation.npz"
+    mine.write_bytes(bytes(1000))
+    os.utime(mine, (0, 0))
+    kept_file(tmp_path, "simulation.npz", age=1e6)
+    (tmp_path / cache.FOLDER / "candela_link.npz").symlink_to(mine)
+    kept_file(tmp_path, "candela_old.npz", age=60.0)
+    kept_file(tmp_path, "candela_new.npz")
+    cache.make_room(tmp_path, limit=150)
+    assert mine.stat().st_size == 1000
+    assert names(tmp_path) == ["candela_link.npz", "candela_new.npz", "simulation.npz"]
 
 
 def test_where_references_are_kept(monkeypatch, tmp_path):
@@ -342,3 +367,30 @@ def test_where_references_are_kept(monkeypatch, tmp_path):
     assert reference.cache_folder() == tmp_path / "candela" / "references"
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
     assert reference.cache_folder().is_relative_to(Path.home())
+
+
+def test_the_second_blender_runs_no_scripts_of_the_file(tmp_path, monkeypatch):
+    """A file that was opened as untrusted is handed on as a copy, of which Blender's preferences know nothing."""
+    started = []
+
+    class Ended:
+        returncode = 0
+
+        def __init__(self, command, **_):
+            started.append(command)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def poll(self):
+            return 0
+
+    monkeypatch.setattr(beside.subprocess, "Popen", Ended)
+    assert list(beside._watched(tmp_path / "scene.blend", tmp_path / "output.txt", {"samples": 1})) == []
+    (command,) = started
+    assert command.index("--disable-autoexec") < command.index(str(tmp_path / "scene.blend")), (
+        "it holds for what follows"
+    )

@@ -88,7 +88,7 @@ def test_slices_make_the_picture_of_all_samples(moving, tmp_path):
     for k in (1, 2, 3):
         done = candela("render", moving, *options, "--slice", f"{k}/3", "--output", f"s{k}.exr", folder=tmp_path)
         assert done.returncode == 0, done.stderr
-    done = candela("merge", "s3.exr", "s1.exr", "s2.exr", "--output", "merged.exr", folder=tmp_path)
+    done = candela("merge", "s3.exr", "s1.exr", "s2.exr", "--file", moving, "--output", "merged.exr", folder=tmp_path)
     assert done.returncode == 0 and done.stderr == ""
     difference = same(tmp_path / "whole.exr", tmp_path / "merged.exr")
     print(f"merged beside whole: {difference:.1e} of the largest value")
@@ -102,16 +102,16 @@ def test_slices_make_the_picture_of_all_samples(moving, tmp_path):
         (("s1.exr", "nothing.exr"), "no file nothing.exr"),
         (("s1.exr", "s2.exr", "s3.exr", "--file", ROOT / "sample_blends" / "cornell_box.blend"), "has been changed"),
     ):
-        done = candela("merge", *arguments, "--output", other, folder=tmp_path)
+        done = candela("merge", "--file", moving, "--output", other, *arguments, folder=tmp_path)
         assert done.returncode == 1 and words in done.stderr and done.stderr.count("\n") == 1, done.stderr
         assert not other.exists()
     done = candela("render", moving, "--size", "32x24", "--samples", "6", "--slice", "3/3", "--output", "s3.exr",
                    folder=tmp_path)  # fmt: skip
     assert done.returncode == 0
-    done = candela("merge", "s1.exr", "s2.exr", "s3.exr", "--output", other, folder=tmp_path)
+    done = candela("merge", "s1.exr", "s2.exr", "s3.exr", "--file", moving, "--output", other, folder=tmp_path)
     assert done.returncode == 1 and "different pictures" in done.stderr
     (tmp_path / "s2.exr").write_bytes((tmp_path / "s2.exr").read_bytes()[:9000])
-    done = candela("merge", "s1.exr", "s2.exr", "--output", other, folder=tmp_path)
+    done = candela("merge", "s1.exr", "s2.exr", "--file", moving, "--output", other, folder=tmp_path)
     assert done.returncode == 1 and "s2.exr" in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
@@ -142,7 +142,7 @@ def test_slices_of_other_settings_are_refused(moving, tmp_path):
         assert candela("render", file, *options, folder=tmp_path).returncode == 0
 
     def refusal():
-        done = candela("merge", "s1.exr", "s2.exr", "--output", "merged.exr", folder=tmp_path)
+        done = candela("merge", "s1.exr", "s2.exr", "--file", file, "--output", "merged.exr", folder=tmp_path)
         return done.stderr if done.returncode else ""
 
     saved(4)

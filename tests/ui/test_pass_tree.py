@@ -225,4 +225,4 @@ def test_compare_shows_the_error_of_each_light_path(tree, tmp_path, monkeypatch)
     for path in ("Diffuse direct", "Glossy direct", "Combined", "Color diffuse"):
         assert f"{path}: " in lines
     assert len(result(node(tree, "direct_light")).errors) == 2, "diffuse and glossy"
-    assert list(tmp_path.glob("*.npz"))
+    assert list(tmp_path.rglob("*.npz"))

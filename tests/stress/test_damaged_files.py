@@ -1,0 +1,128 @@
+"""Files that are damaged at random: each is read or refused in a sentence, within bounds of memory and time.
+
+CANDELA_FUZZ=2000 tries that many of each kind.
+"""
+
+import json
+import os
+import struct
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from addon.compare.exr_write import read_about, write_exr
+from addon.gfx import device
+from addon.materials import ies
+from addon.snapshot.exr import ExrError, read_exr
+
+COUNT = int(os.environ.get("CANDELA_FUZZ", "100"))
+MOST_BYTES, MOST_SECONDS = 200 << 20, 2.0  # for one file of some kilobytes
+PROFILE = """IESNA:LM-63-2002
+TILT=NONE
+1 1000 1 5 4 1 2 0 0 0
+1 1 100
+0 45 90 135 180
+0 90 180 270
+1 2 3 4 5 1 2 3 4 5 1 2 3 4 5 1 2 3 4 5
+"""
+
+
+def damaged(data: bytes, count: int):
+    """The data cut, with bytes of chance, with runs of one byte, with extreme numbers, or with parts twice."""
+    chance = np.random.default_rng(17)
+    extremes = [struct.pack("<i", value) for value in (-1, 0, 2**31 - 1, -(2**31), 65536)] + [b"1e999", b"nan", b"-1 "]
+    for _ in range(count):
+        made = bytearray(data)
+        for _ in range(int(chance.integers(1, 6))):
+            at = int(chance.integers(0, max(len(made), 1)))
+            what = int(chance.integers(0, 5))
+            if what == 0:
+                del made[at:]
+            elif what == 1:
+                made[at : at + 4] = chance.bytes(4)
+            elif what == 2:
+                made[at : at + 16] = bytes([int(chance.integers(0, 256))]) * 16
+            elif what == 3:
+                made[at : at + 4] = extremes[int(chance.integers(0, len(extremes)))]
+            else:
+                made[at:at] = made[at : at + int(chance.integers(1, 200))]
+        yield bytes(made)
+
+
+def bounded(work) -> None:
+    """Do the work and hold it to memory and time."""
+    tracemalloc.start()
+    started = time.process_time()
+    try:
+        work()
+    finally:
+        taken, (_, most) = time.process_time() - started, tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert most < MOST_BYTES, f"{most >> 20} MiB"
+    assert taken < MOST_SECONDS, f"{taken:.1f} s"
+
+
+def test_damaged_exr_files_are_refused_in_a_sentence(tmp_path):
+    path = tmp_path / "a.exr"
+    pixels = np.random.default_rng(1).random((40, 30, 4)).astype(np.float32)
+    write_exr(path, {"A.Combined": pixels, "A.Depth": pixels[..., :1]}, {"candela": json.dumps({"file": "x"})})
+
+    def read():
+        for reader in (read_exr, read_about):
+            try:
+                reader(path)
+            except ExrError as error:
+                assert str(path) in str(error)
+
+    for data in damaged(path.read_bytes(), COUNT):
+        path.write_bytes(data)
+        bounded(read)
+
+
+def test_a_window_that_the_file_cannot_hold_takes_no_memory(tmp_path):
+    path = tmp_path / "a.exr"
+    write_exr(path, {"A": np.zeros((4, 4, 4), np.float32)}, {})
+    huge = struct.pack("<4i", 0, 0, 65535, 65535)
+    path.write_bytes(path.read_bytes().replace(struct.pack("<4i", 0, 0, 3, 3), huge))
+
+    def read():
+        with pytest.raises(ExrError, match="more pixels than a file of its length can hold"):
+            read_exr(path)
+
+    bounded(read)
+
+
+def test_damaged_light_profiles_are_read_or_said_to_be_unreadable():
+    def read(text):
+        pixels, said = ies.profile_pixels(ies.Profile(text))
+        assert np.isfinite(pixels).all() and (pixels >= 0).all()
+        assert not said or "cannot be read" in said
+
+    read(PROFILE)
+    for data in damaged(PROFILE.encode(), COUNT):
+        bounded(lambda text=data.decode("latin-1"): read(text))
+    ies.profile_pixels.cache_clear()
+
+
+def test_damaged_figures_of_devices_are_measured_anew(tmp_path, monkeypatch):
+    monkeypatch.setattr(device, "key", lambda: "this driver")
+    device.write(tmp_path, device.MADE_UP["card"])
+    assert device.read(tmp_path) == device.MADE_UP["card"]
+    whole = (tmp_path / "devices.json").read_bytes()
+    broken = [
+        *damaged(whole, COUNT),
+        b"[" * 100_000,
+        b"null",
+        b"[]",
+        b'{"this driver": {"fetch": 1' + b"0" * 500 + b"}}",
+    ]
+    for data in broken:
+        (tmp_path / "devices.json").write_bytes(data)
+
+        def read():
+            found = device.read(tmp_path)
+            assert found is None or isinstance(found, device.Device)
+
+        bounded(read)
