@@ -11,7 +11,7 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast test-vulkan stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
+.PHONY: help environment demo pictures samples test test-all test-fast test-vulkan stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
@@ -31,9 +31,14 @@ samples: ## write the sample scenes anew, with Blender 4.5, so that every suppor
 	@$(PYTHON3) tools/environment.py --blender 4.5
 	.venv-4.5/bin/python sample_blends/make.py
 
-test: environment ## every test that needs no window
-	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing"
-	$(PYTHON) -m pytest -m timing
+test: environment ## the tests that take seconds, and a sample of the slow ones (CANDELA_SAMPLE=seed): about 10 minutes
+	@echo "About 10 minutes on two cores; 'make test-all' runs every test, in about 25."
+	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing" --slow=sample
+	$(PYTHON) -m pytest -m timing --slow=sample
+
+test-all: test ## every test that needs no window: those of `make test`, then the other slow ones
+	$(PYTHON) -m pytest $(PARALLEL) -m "slow and not window and not timing" --slow=rest
+	$(PYTHON) -m pytest -m "slow and timing" --slow=rest || [ $$? = 5 ]  # 5: none is left
 
 test-fast: environment ## the tests that take seconds
 	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing and not slow"

@@ -1,5 +1,6 @@
-"""What every test may ask for, and how the test process ends."""
+"""What every test may ask for, which slow tests are chosen, and how the test process ends."""
 
+import hashlib
 import os
 import sys
 
@@ -7,6 +8,36 @@ import pytest
 
 # Choices between methods do not depend on the clock of the machine that tests.
 os.environ.setdefault("CANDELA_DEVICE", "software")
+
+
+ONE_IN = 12  # slow tests that the sample takes
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--slow", choices=("all", "sample", "rest"), default="all",
+        help="of the slow tests all, a sample by CANDELA_SAMPLE (a seed, 0), or those that it leaves out",
+    )  # fmt: skip
+
+
+def pytest_collection_modifyitems(config, items):
+    wish = config.getoption("--slow")
+    if wish == "all":
+        return
+    kept, left_out = [], []
+    for item in items:
+        is_slow = item.get_closest_marker("slow") is not None
+        wanted = not is_slow or in_sample(item.nodeid) == (wish == "sample")
+        (kept if wanted else left_out).append(item)
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = kept
+
+
+def in_sample(name: str) -> bool:
+    """Whether the sample of slow tests holds the one of this name: the same on every machine."""
+    seed = os.environ.get("CANDELA_SAMPLE", "0")
+    digest = hashlib.blake2b(f"{seed} {name}".encode(), digest_size=4).digest()
+    return int.from_bytes(digest, "big") % ONE_IN == 0
 
 
 @pytest.fixture(scope="session")

@@ -286,8 +286,9 @@ def test_merge_opens_no_file_that_a_slice_names(tmp_path):
 
 
 HEADER = {
-    "file": "/elsewhere/scene.blend", "scene_hash": "abc123", "settings_hash": "", "blender": "", "frame": 1, "total": 2,
-    "first": 0, "count": 1, "layers": ["A"], "options": {"size": None, "scene": "S", "view_layer": None, "assignments": []},
+    "file": "/elsewhere/scene.blend", "scene_hash": "abc123", "settings_hash": "", "blender": "", "frame": 1,
+    "total": 2, "first": 0, "count": 1, "layers": ["A"],
+    "options": {"size": None, "scene": "S", "view_layer": None, "assignments": []},
 }  # fmt: skip
 
 

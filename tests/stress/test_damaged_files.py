@@ -8,6 +8,7 @@ import os
 import struct
 import time
 import tracemalloc
+from functools import partial
 
 import numpy as np
 import pytest
@@ -102,7 +103,7 @@ def test_damaged_light_profiles_are_read_or_said_to_be_unreadable():
 
     read(PROFILE)
     for data in damaged(PROFILE.encode(), COUNT):
-        bounded(lambda text=data.decode("latin-1"): read(text))
+        bounded(partial(read, data.decode("latin-1")))
     ies.profile_pixels.cache_clear()
 
 
