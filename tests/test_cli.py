@@ -12,6 +12,7 @@ import pytest
 from addon.cli.refused import Refused
 from addon.cli.slices import read_header
 from addon.compare.exr_write import write_exr
+from addon.snapshot.exr import read_exr
 
 ROOT = Path(__file__).resolve().parent.parent
 CORNELL = ROOT / "sample_blends" / "cornell_box.blend"
@@ -202,7 +203,6 @@ def test_render_writes_the_files_passes_as_multilayer_exr(tmp_path):
     output = tmp_path / "picture.exr"
     done = candela("render", CORNELL, *TINY, "--output", output, folder=tmp_path)
     assert done.returncode == 0 and done.stderr == ""
-    from addon.snapshot.exr import read_exr
 
     layers = read_exr(output)
     assert layers["ViewLayer.Combined"].shape == (24, 32, 4)
@@ -304,6 +304,33 @@ def test_a_header_that_is_none_is_refused_in_a_sentence(tmp_path, about):
     write_exr(path, {"A.Combined": np.zeros((2, 2, 4), np.float32)}, {"candela": json.dumps(about)})
     with pytest.raises(Refused, match="no proper header of a slice"):
         read_header(path)
+
+
+BALL = """
+import os, sys
+import bpy
+
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=14, radius=0.6, location=(0, 0, 0.8))
+bpy.context.object.data.shade_smooth()
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+os._exit(0)
+"""
+
+
+@pytest.mark.slow
+def test_four_processes_render_one_picture(tmp_path):
+    """Blender's smooth normals differ in their last bits from process to process; farms need one answer."""
+    path = tmp_path / "ball.blend"
+    foliage = ROOT / "sample_blends" / "alpha_foliage.blend"
+    subprocess.run([sys.executable, "-c", BALL, str(foliage), str(path)], check=False, capture_output=True, timeout=120)
+    pictures = []
+    for number in range(4):
+        done = candela("render", path, *TINY, "--output", f"{number}.exr", folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+        pictures.append(read_exr(tmp_path / f"{number}.exr")["ViewLayer.Combined"])
+    for one in pictures[1:]:
+        np.testing.assert_array_equal(one, pictures[0])
 
 
 @pytest.mark.slow
