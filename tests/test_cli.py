@@ -320,7 +320,8 @@ os._exit(0)
 
 @pytest.mark.slow
 def test_four_processes_render_one_picture(tmp_path):
-    """Blender's smooth normals differ in their last bits from process to process; farms need one answer."""
+    """Farms need one answer. A ball that an operator makes has its faces in another order in each process, and so other
+    last bits of its normals; in a file that order stands, and the normals are the same to the bit."""
     path = tmp_path / "ball.blend"
     foliage = ROOT / "sample_blends" / "alpha_foliage.blend"
     subprocess.run([sys.executable, "-c", BALL, str(foliage), str(path)], check=False, capture_output=True, timeout=120)

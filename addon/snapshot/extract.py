@@ -193,7 +193,7 @@ def _meshes(
     read = 0
     keys = _mesh_keys(first)
     for pointer, source in first.items():
-        entry, was_read = _sync_mesh(keys[pointer], source, wanted[pointer], cache, depsgraph.mode == "RENDER")
+        entry, was_read = _sync_mesh(keys[pointer], source, wanted[pointer], cache)
         read += was_read
         notes += entry.notes
         meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
@@ -295,8 +295,8 @@ def _mesh_keys(first: dict[int, Source]) -> dict[int, str]:
     return keys
 
 
-def _sync_mesh(key: str, source: Source, wanted: Wanted, cache: SnapshotCache, final: bool) -> tuple[MeshEntry, bool]:
-    """The mesh as it is now, and whether its content is new. `final`: its pixels are to be the same everywhere."""
+def _sync_mesh(key: str, source: Source, wanted: Wanted, cache: SnapshotCache) -> tuple[MeshEntry, bool]:
+    """The mesh as it is now, and whether its content is new."""
     facts = source.facts
     mesh, entry = source.data, cache.meshes.get(key)
     asked = wanted.names
@@ -310,7 +310,7 @@ def _sync_mesh(key: str, source: Source, wanted: Wanted, cache: SnapshotCache, f
     if editing:
         mesh = source.owner.to_mesh()  # asking it to preserve all layers would give the mesh before the edits
     try:
-        raw = read_mesh(mesh, wanted, fixed_order=final)
+        raw = read_mesh(mesh, wanted)
         digest = raw.digest()
         if entry is not None and entry.digest == digest and entry.asked == asked:
             entry.evaluation = source.data.session_uid

@@ -18,7 +18,6 @@ import numpy as np
 from ..materials.nodes.inputs import CORNER, FLAT, ISLAND, MARK, PLACE, POINTINESS, STRAND, WAY
 from .cache import next_version
 from .hair import HairSystem, read_hair
-from .normals import in_fixed_order
 from .scene import Mesh, Note
 from .shape import corner_numbers, island_numbers, pointiness
 from .strands import HAIR_RADIUS, POINT_RADIUS, between, point_facts, spheres, strand_facts, strand_places, tubes
@@ -81,9 +80,9 @@ class RawMesh:
         return state.digest()
 
 
-def read_mesh(mesh, wanted: Wanted, fixed_order: bool = False) -> RawMesh:
+def read_mesh(mesh, wanted: Wanted) -> RawMesh:
     """Copy the arrays of an evaluated Mesh, Curves or PointCloud, or of a HairSystem. A mesh must hold data, not an
-    edit-mode wrapper. `fixed_order`: smooth normals are the same to the bit in every process (normals.py)."""
+    edit-mode wrapper."""
     if mesh.id_type == "HAIR":
         return _read_particle_hair(mesh, wanted)
     if mesh.id_type != "MESH":
@@ -99,9 +98,6 @@ def read_mesh(mesh, wanted: Wanted, fixed_order: bool = False) -> RawMesh:
     else:
         face_starts = np.empty(faces, np.int32)
         mesh.polygons.foreach_get("loop_start", face_starts)
-    flat = mesh.normals_domain == "FACE"
-    if fixed_order and not flat:
-        corner_normals = in_fixed_order(positions, corner_vertices, face_starts, corner_normals)
     face_slots = None
     if "material_index" in mesh.attributes:
         face_slots = _attribute(mesh, "material_index", "value", faces, np.int32, 1)
@@ -121,7 +117,7 @@ def read_mesh(mesh, wanted: Wanted, fixed_order: bool = False) -> RawMesh:
         colors=colors,
         active_color=active_color,
         generated=_read_generated(mesh) if wanted.generated else None,
-        flat=flat,
+        flat=mesh.normals_domain == "FACE",
     )
 
 
