@@ -285,6 +285,9 @@ def render_settings(
         settings.append((getattr(view_layer, owner, None) if owner else view_layer, name, True))
     if engine == "CYCLES":
         settings += cycles_settings(scene, samples, seed, MANY_BOUNCES if bounces is None else bounces)
+        if bounces is None:  # media scatter light as often in both: as often as the scene says
+            own = getattr(getattr(scene, "candela", None), "airlight_bounces", -1)
+            settings.append((scene.cycles, "volume_bounces", own if own >= 0 else scene.cycles.volume_bounces))
     elif engine in EEVEE:
         settings.append((scene.eevee, "taa_render_samples", samples))
     else:
@@ -293,6 +296,7 @@ def render_settings(
         settings += [(own, param.name, param.default) for param in PARTIAL]  # all samples that are asked for
         if bounces is not None:
             settings.append((own, "bounces", bounces))
+            settings.append((getattr(scene, "cycles", None), "volume_bounces", bounces))  # Candela's where it has none
     return [setting for setting in settings if setting[0] is not None and hasattr(setting[0], setting[1])]
 
 

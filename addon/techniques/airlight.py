@@ -64,6 +64,7 @@ COARSE = 2  # pixels of one known pixel's side then
 COARSE_WALKS = 4  # of each of them, from FEW samples on
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
 FEW_WORLD_DIRECTIONS = 8  # below FEW samples, where two are most of what the whole picture gets
+AS_IN_CYCLES = -1  # bounces: as the scene has them there
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
 MOST_LAMPS = 16  # in a sample
 SENDING = (
@@ -194,10 +195,10 @@ class Airlight(Technique):
             1, 64, draft=2,
         ),
         Param(
-            "bounces", "Volume bounces", 8,
+            "bounces", "Volume bounces", AS_IN_CYCLES,
             "Maximum number of times light is scattered or reflected before a medium scatters it to the camera; 0: "
-            "light of lamps and world only",
-            0, MOST_BOUNCES, draft=2,
+            "light of lamps and world only; -1: as many as the scene's light paths allow in Cycles",
+            AS_IN_CYCLES, MOST_BOUNCES, draft=2,
         ),
     )  # fmt: skip
     reads = SURFACES
@@ -247,7 +248,7 @@ class Airlight(Technique):
             },
         )  # fmt: skip
         frame.count(self, "light samples", lit.rows)
-        bounces = min(frame.settings.bounces, frame.settings.get(self, "bounces"))
+        bounces = min(frame.settings.bounces, max(frame.settings.get(self, "bounces"), 0))
         if bounces and (media.media.scatters or media.media.emits):
             self._reflectance.update(frame)
             shining = media.media.emits

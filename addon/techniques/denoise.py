@@ -1,6 +1,7 @@
 """Denoise: noise that is left in light after the last sample is filtered where variance tells it from shading.
 
-    light = sum / colour            of diffuse direct, diffuse indirect and glossy indirect light, each by itself
+    light = sum / colour            of diffuse direct, diffuse indirect and glossy indirect light, each by itself;
+                                    sum of direct and indirect light of media
     out   = light(p) + sum over pixels q  w(p, q) (light(q) - light(p))
     w     = binomial * same surface * exp(-(light(p) - light(q))^2 / s^2)
     s^2   = k^2 sqrt(var(p) var(q)) + light(p) light(q) / 100^2
@@ -43,6 +44,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..lighting.grass import GrassTable
 from ..lighting.path_sources import SHOWN
+from ..scene.media import has_media
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import no_diffuse_light
@@ -61,7 +63,10 @@ FILTERS = {
     "diffuse_direct": Filter(3.0, 32.0, (1, 2, 4)),
     "diffuse_indirect": Filter(5.5, 8.0, (1, 2, 4, 8, 1)),
     "glossy_indirect": Filter(5.0, 8.0, (1, 2, 4, 8, 1)),
+    "volume_direct": Filter(3.0, 8.0, (1, 2, 4)),
+    "volume_indirect": Filter(5.0, 8.0, (1, 2, 4, 8, 1)),
 }
+OF_MEDIA = ("volume_direct", "volume_indirect")  # exchanged along what is seen equally far away; no colour
 FEWEST = 2  # samples: one for each half
 GUIDES = (("RGBA32F", "surface_position"), ("RGBA32F", "normal_sum"))
 LEAST_COLOR = (("LEAST_COLOR", "1e-4"),)  # albedo below this sends nothing that is seen
@@ -87,6 +92,14 @@ LEVEL = passes.fullscreen_program(
     constants=(("INT", "stride"), ("FLOAT", "tolerance"), ("FLOAT", "sharpness")),
     outputs=(("VEC4", "out_light"),),
 )
+# The same for light of media.
+BEGIN_OF_MEDIA = replace(
+    BEGIN, name="denoise: light of media and variance", textures=(GUIDES[0], *BEGIN.textures[2:4]),
+    defines=(("OF_MEDIA", "1"),),
+)  # fmt: skip
+LEVEL_OF_MEDIA = replace(
+    LEVEL, name="denoise: level of media", textures=(GUIDES[0], *LEVEL.textures[2:]), defines=(("OF_MEDIA", "1"),)
+)
 # The same for reflections, whose edges no surface has: `shown_sum` is image SHOWN.
 LEVEL_OF_REFLECTIONS = replace(
     LEVEL,
@@ -102,6 +115,9 @@ END = passes.fullscreen_program(
     constants=(("INT", "count"),),
     defines=LEAST_COLOR,
     outputs=(("VEC4", "out_sum"),),
+)
+END_OF_MEDIA = replace(
+    END, name="denoise: light of media", textures=(END.textures[0], END.textures[2]), defines=(("OF_MEDIA", "1"),)
 )
 
 
@@ -122,8 +138,13 @@ class Denoise(Technique):
             write
             for path in FILTERS
             for write in (
-                Write(f"denoise.{path}_half", "RGBA32F", "What the first half of the samples summed up"),
-                Write(f"denoise.{path}", "RGBA32F", "The sum of all samples, denoised"),
+                Write(
+                    f"denoise.{path}_half",
+                    "RGBA32F",
+                    "What the first half of the samples summed up",
+                    by_need=path in OF_MEDIA,
+                ),
+                Write(f"denoise.{path}", "RGBA32F", "The sum of all samples, denoised", by_need=path in OF_MEDIA),
             )
         ),
     )
@@ -135,6 +156,8 @@ class Denoise(Technique):
             return "its strength is 0"
         if settings.samples < FEWEST:
             return f"the picture has fewer than {FEWEST} samples"
+        if has_media(snapshot):
+            return None
         if not snapshot.instances:
             return "the scene has no surface"
         return no_diffuse_light(snapshot)
@@ -143,8 +166,13 @@ class Denoise(Technique):
         return (*(f"radiance.{path}" for path in FILTERS), "color.diffuse", "color.glossy", "surface.normal_sum")
 
     def begin(self, frame: Frame) -> None:
+        for path in self._paths(frame):
+            for name in (f"denoise.{path}_half", f"denoise.{path}"):
+                if name not in frame.images:
+                    frame.images[name] = images.pool.take(*frame.size, "RGBA32F")
         for write in self.writes:
-            if write.name.startswith("denoise."):  # a pass tree may show what no light path needs
+            # A pass tree may show what no light path needs.
+            if write.name.startswith("denoise.") and write.name in frame.images:
                 frame.target(write.name).clear()
         frame.read_last |= {"surface.position", "surface.lobe"} if _beside_grass(frame) else {"surface.position"}
 
@@ -193,10 +221,11 @@ class Denoise(Technique):
         return [path for path in FILTERS if path in shown]
 
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:
-        sums = {"sum_now": frame.images[f"film.{path}"], "color_sum": frame.images[f"color.{path.split('_')[0]}"]}
-        guides = {
-            "surface_position": frame.images["surface.position"], "normal_sum": frame.images["surface.normal_sum"],
-        }  # fmt: skip
+        sums, guides = {"sum_now": frame.images[f"film.{path}"]}, {"surface_position": frame.images["surface.position"]}
+        begin, level, end = (BEGIN_OF_MEDIA, LEVEL_OF_MEDIA, END_OF_MEDIA) if path in OF_MEDIA else (BEGIN, LEVEL, END)
+        if path not in OF_MEDIA:
+            sums["color_sum"] = frame.images[f"color.{path.split('_')[0]}"]
+            guides["normal_sum"] = frame.images["surface.normal_sum"]
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
         half_count, half = self._half(frame, path, count)
         grass = path == "diffuse_direct" and _beside_grass(frame)
@@ -204,12 +233,12 @@ class Denoise(Technique):
         with images.borrowed(*frame.size, "RGBA32F") as light, images.borrowed(*frame.size, "RGBA32F") as other:
             for rows in frame.bands(self):
                 passes.fullscreen(
-                    BEGIN_BESIDE_GRASS if lobes else BEGIN, light, rows=rows, blocks=blocks,
+                    BEGIN_BESIDE_GRASS if lobes else begin, light, rows=rows, blocks=blocks,
                     textures={**guides, **sums, **lobes, "half_sum": frame.images[half]},
                     constants={"count": count, "half_count": half_count, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield
-            level, shown = LEVEL, {}
+            shown = {}
             if path == "glossy_indirect" and SHOWN in frame.images:
                 level, shown = LEVEL_OF_REFLECTIONS, {"shown_sum": frame.images[SHOWN]}
             tolerance = how.tolerance * frame.settings.get(self, "strength")
@@ -224,7 +253,7 @@ class Denoise(Technique):
                     yield
                 light, other = other, light
             textures = {"light_in": light.colors[0], **sums}
-            passes.fullscreen(END, frame.target(f"denoise.{path}"), textures=textures, constants={"count": count})
+            passes.fullscreen(end, frame.target(f"denoise.{path}"), textures=textures, constants={"count": count})
         frame.count(self, "passes", len(how.strides) + 2)
 
 

@@ -34,6 +34,7 @@ from ..frame.technique import (
     identifier,
 )
 from ..techniques import REGISTRY
+from ..techniques.airlight import AS_IN_CYCLES, MOST_BOUNCES, Airlight
 from ..techniques.denoise import Denoise
 from .pass_tree import TREE, order_of
 
@@ -267,12 +268,19 @@ def _of_a_picture(registry: tuple) -> list[tuple[str, tuple[str, str], str, bool
     ]
 
 
+def _volume_bounces(scene) -> int:
+    """Of the scene's light paths; there while the Cycles add-on is enabled."""
+    return min(getattr(getattr(scene, "cycles", None), "volume_bounces", 0), MOST_BOUNCES)
+
+
 def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgraph=None) -> Settings:
     """The Blender properties of the scene, its camera and world as plain settings; in a final render of a view layer,
     with its number of samples where it has one of its own. With a dependency graph, as they are evaluated."""
     group = block_of(SCENE, scene, depsgraph).candela
     tree = group.pass_tree
     values = _values(scene, depsgraph)
+    if values.get((Airlight.name, "bounces")) == AS_IN_CYCLES:
+        values[Airlight.name, "bounces"] = _volume_bounces(block_of(SCENE, scene, depsgraph))
     if not (group.use_viewport_denoise if viewport else group.use_denoise):
         values[Denoise.name, "strength"] = 0.0
     final = (layer.samples if layer is not None else 0) or group.samples

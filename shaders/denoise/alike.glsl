@@ -1,6 +1,25 @@
 // How much two pixels show the same surface, 0 to 1, the same seen from either: by the mean normals of all samples, and
 // by the distance from each other's tangent plane, which may be some pixels for neighbours `stride` pixels apart. Programs
 // have the constant `sharpness`, of the cosine between normals: 32 is half at 12 degrees, 8 at 24.
+// OF_MEDIA: whether the air before what they show is as deep.
+#ifdef OF_MEDIA
+struct Shown {
+  float away;
+};
+
+bool shown_at(ivec2 pixel, out Shown shown)
+{
+  vec4 position = surface_position_fetch(pixel);
+  shown.away = (position.w != 0.0) ? distance(position.xyz, film_view.eye.xyz) : 1e18;
+  return true;
+}
+
+float alike(Shown one, Shown other, int spacing)
+{
+  float most = max(one.away, other.away);
+  return max(1.0 - 8.0 * abs(one.away - other.away) / (max(most, 1e-30) * float(spacing)), 0.0);
+}
+#else
 #include "neighbours/pixel_size.glsl"
 
 struct Shown {
@@ -27,3 +46,4 @@ float alike(Shown one, Shown other, int spacing)
   float off_plane = max(abs(dot(one.normal, path)), abs(dot(other.normal, path)));
   return turned * exp(-off_plane / (max(one.pixel_size, other.pixel_size) * 2.0 * float(spacing + 1)));
 }
+#endif

@@ -8,7 +8,11 @@
 
 vec3 without_color(vec3 light, ivec2 pixel)
 {
+#ifdef OF_MEDIA
+  return light;
+#else
   return light / max(color_sum_fetch(pixel).rgb / float(count), vec3(LEAST_COLOR));
+#endif
 }
 
 float half_difference(ivec2 pixel, vec3 whole)
@@ -32,7 +36,11 @@ void main()
   }
 #endif
   Shown here;
+#ifdef OF_MEDIA
+  bool colored = true;
+#else
   bool colored = max_component(color_sum_fetch(pixel).rgb) > LEAST_COLOR * float(count);
+#endif
   if (!shown_at(pixel, here) || !colored) {
     return;
   }

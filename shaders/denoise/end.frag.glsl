@@ -3,7 +3,11 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 light = light_in_fetch(pixel);
-  vec4 color = color_sum_fetch(pixel);
   vec4 sum = sum_now_fetch(pixel);
+#ifdef OF_MEDIA
+  out_sum = vec4((light.a < 0.0) ? sum.rgb : light.rgb * float(count), sum.a);
+#else
+  vec4 color = color_sum_fetch(pixel);
   out_sum = (light.a < 0.0) ? sum : vec4(light.rgb * max(color.rgb, vec3(LEAST_COLOR * float(count))), sum.a);
+#endif
 }

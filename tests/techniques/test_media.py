@@ -8,6 +8,7 @@ from addon.gfx import images, passes
 from addon.materials.volume import PHASES, Medium
 from addon.scene.media import phase_values
 from addon.snapshot.volumes import openvdb
+from addon.ui.properties import settings_of
 from tests.techniques.foggy_stage import absorber, box, fog, glowing_floor, volume
 
 trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
@@ -484,3 +485,33 @@ def test_a_medium_before_another_dims_its_airlight_by_beer_and_lambert(stage):
     stage.camera_above(0.5)
     seen = stage.render(16, size=(16, 16), bounces=0)["volume_direct"][..., :3].mean((0, 1))
     np.testing.assert_allclose(seen / seen[2], np.exp(-np.array([0.7, 0.2, 0.0])), rtol=0.01)
+
+
+def test_volume_bounces_are_those_of_the_scene(stage):
+    """Of its light paths for Cycles, but where Candela's own number is set."""
+    scene = stage.scene
+    before = scene.cycles.volume_bounces
+    try:
+        for own, cycles, wanted in ((-1, 0, 0), (-1, 3, 3), (-1, 100, 12), (2, 3, 2)):
+            scene.candela.airlight_bounces, scene.cycles.volume_bounces = own, cycles
+            assert settings_of(scene, viewport=False).values["airlight", "bounces"] == wanted
+    finally:
+        scene.cycles.volume_bounces = before
+
+
+def test_denoising_keeps_the_light_of_a_shaft_and_takes_its_noise(stage):
+    """A round lamp behind a plate with a hole, before a black backdrop in part: what is not noise stays."""
+    candela = stage.scene.candela
+    candela.slot_indirect, candela.airlight_bounces = "OFF", 0
+    stage.camera((0, -6, 1), (np.pi / 2, 0, 0), angle=0.6)
+    fog(stage, Density=0.1)
+    for low, high in (((-2, -2), (-0.3, 2)), ((0.3, -2), (2, 2))):
+        stage.rectangle(low, high, 2.0, material=stage.diffuse(0.0))
+    stage.light("POINT", (0, 0, 3.5), energy=100, shadow_soft_size=0.5)
+    light = {}
+    for name, samples, strength in (("noisy", 8, 0.0), ("denoised", 8, 1.0), ("truth", 64, 0.0)):
+        candela.denoise_strength = strength
+        light[name] = stage.render(samples, size=(32, 32), seed=samples)["volume_direct"][..., 0]
+    assert light["denoised"].mean() == pytest.approx(light["truth"].mean(), rel=0.03)
+    error = {name: np.square(light[name] - light["truth"]).mean() for name in ("noisy", "denoised")}
+    assert error["denoised"] < 0.8 * error["noisy"]
