@@ -1,7 +1,6 @@
 """Denoise: noise that is left in light after the last sample is filtered where variance tells it from shading.
 
-    light = sum / colour            of diffuse direct, diffuse indirect and glossy indirect light, each by itself;
-                                    sum of direct and indirect light of media
+    light = sum / colour            of diffuse and glossy light, each path by itself; of media without colour
     out   = light(p) + sum over pixels q  w(p, q) (light(q) - light(p))
     w     = binomial * same surface * exp(-(light(p) - light(q))^2 / s^2)
     s^2   = k^2 sqrt(var(p) var(q)) + light(p) light(q) / 100^2
@@ -23,10 +22,8 @@ nothing changes, so the result still converges; textures are divided out before 
 | fetches per noisy pixel and path | 9 x 5 + 3 or 5 x 25 x 3; 54 or 60 where there is no noise |
 
 Bias: light is spread by at most 14 pixels over a surface, indirect light by 32, by an amount that the standard error
-hides; means stay.
-
-Fails: creases in sunlit scenes whose indirect light fades within some pixels are blurred. Not filtered: direct gloss,
-glass, emission, pixels without the path's colour, pictures of one sample, drafts.
+hides; means stay. Fails: creases in sunlit scenes whose indirect light fades within some pixels are blurred. Not
+filtered: direct gloss, glass, emission, pixels without the path's colour, pictures of one sample, drafts.
 
 Errors with and without it, and what was tried and left: docs/log/2026-11-26-denoise.md.
 """
