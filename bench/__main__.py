@@ -30,6 +30,7 @@ from bench import (
     mutations,
     others,
     page,
+    pairs,
     points_motion,
     profile,
     random_scenes,
@@ -81,6 +82,7 @@ VERBS = {
     "ages": ages,
     "hashes": hashes,
     "mutations": mutations,
+    "pairs": pairs,
     "all": everything,
 }
 

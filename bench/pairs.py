@@ -1,0 +1,261 @@
+"""Features that meet, beside Cycles: `python -m bench pairs`.
+
+Every pair of the features of bench/pair_features.py is drawn in one small room by Candela, with 1 and with 16 samples
+and all bounces, and by Cycles, whose pictures are kept by content. Judged are the ratio of means and relMSE of the means
+of 4x4 pixels, which noise of single pixels hardly moves:
+
+    green   within the bounds of its number of samples, to which the reference's own noise is added
+    amber   beyond them, and a sentence said that something is drawn otherwise
+    red     beyond them without a word, or no picture, or values that are not finite
+
+Results go to out/pairs.json as they come; another run goes on with what is missing. `--triples N` draws N triples at
+random instead. `--page` writes docs/pairs.md and its picture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import random
+import resource
+import traceback
+from pathlib import Path
+
+import numpy as np
+
+from bench.cells import ROOT
+from bench.markdown import begin, put_between, table, write_whole
+from bench.pair_features import FEATURES, Room
+
+COMMAND = "python -m bench pairs"
+RESULTS, PAGE, PICTURE = ROOT / "out" / "pairs.json", ROOT / "docs" / "pairs.md", ROOT / "docs" / "images" / "pairs.png"
+SIZE, REFERENCE_SAMPLES, BLOCK = (48, 36), 384, 4
+BOUNDS = {1: (0.10, 0.10), 16: (0.03, 0.02)}  # by samples: how far the ratio of means is from 1, relMSE of blocks
+GREEN, AMBER, RED = "green", "amber", "red"
+DARK = 0.1  # of the mean luminance: below it, errors count as absolute
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--only", metavar="FEATURE", nargs="+", help="pairs of these with any; two of them: that pair")
+    parser.add_argument("--alone", action="store_true", help="each feature by itself, first of all")
+    parser.add_argument("--triples", metavar="N", type=int, default=0, help="so many triples at random")
+    parser.add_argument("--seed", type=int, default=1, help="of the triples and of --sample")
+    parser.add_argument("--sample", metavar="N", type=int, default=0, help="only so many of the pairs, at random")
+    parser.add_argument("--part", metavar="K/N", default="1/1", help="every Nth, from the Kth on")
+    parser.add_argument("--samples", type=int, nargs="+", default=sorted(BOUNDS), choices=sorted(BOUNDS))
+    parser.add_argument("--again", action="store_true", help="render what is known, too")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="write pictures: Candela's, then Cycles'")
+    parser.add_argument("--page", action="store_true", help=f"write {PAGE.name} from what is known")
+
+
+def command(options: argparse.Namespace) -> int:
+    import addon
+
+    addon.register()
+    known = read()
+    made = [one for one in chosen(options) if options.again or any(str(n) not in known.get(key(one), {})
+                                                                   for n in options.samples)]  # fmt: skip
+    stage = _stage()
+    for number, names in enumerate(made):
+        found = measure(stage, names, options.samples, options.keep)
+        known = read()  # another process may have written
+        known[key(names)] = known.get(key(names), {}) | found
+        RESULTS.parent.mkdir(exist_ok=True)
+        write_whole(RESULTS, json.dumps(known, indent=0))
+        print(f"{number + 1}/{len(made)}  {line(names, found)}", flush=True)
+    wanted = {key(one): known[key(one)] for one in chosen(options) if key(one) in known}
+    print(table(summary(wanted)))
+    print(table(worst(wanted)))
+    if options.page:
+        write_page(known)
+    return 1 if any(colour(one) == RED for found in wanted.values() for one in found.values()) else 0
+
+
+def _stage():
+    from tests.techniques.conftest import Stage
+
+    return Stage()
+
+
+def key(names: tuple[str, ...]) -> str:
+    return " + ".join(names)
+
+
+def chosen(options: argparse.Namespace) -> list[tuple[str, ...]]:
+    """What is asked for, as names of features."""
+    names, chance = list(FEATURES), random.Random(options.seed)
+    if options.alone:
+        made = [(name,) for name in names if not options.only or name in options.only]
+    elif options.triples:
+        made = [tuple(sorted(chance.sample(names, 3), key=names.index)) for _ in range(options.triples)]
+    else:
+        made = list(itertools.combinations(names, 2))
+        if options.only:
+            wanted = set(options.only)
+            unknown = wanted - set(names)
+            if unknown:
+                raise SystemExit(f"There is no feature {', '.join(sorted(unknown))}; there are {', '.join(names)}.")
+            enough = 2 if len(wanted) == 2 else 1
+            made = [one for one in made if len(wanted & set(one)) >= enough]
+        if options.sample:
+            made = chance.sample(made, min(options.sample, len(made)))
+    first, _, step = options.part.partition("/")
+    return made[int(first) - 1 :: int(step or 1)]
+
+
+def measure(stage, names: tuple[str, ...], samples: list[int], keep: Path | None = None) -> dict[str, dict]:
+    """By number of samples: error of the picture in which these features meet, or why there is none."""
+    from addon.compare.reference import reference, render_passes
+    from addon.frame import ledger
+
+    found: dict[str, dict] = {}
+    try:
+        room = Room(stage)
+        for name in names:
+            FEATURES[name](room)
+        truth = reference(room.scene, REFERENCE_SAMPLES, size=SIZE)
+    except Exception:
+        traceback.print_exc()
+        return {str(n): {"failed": "the scene or its reference: " + traceback.format_exc(limit=1)} for n in samples}
+    pixels, half = truth.images["combined"][..., :3], truth.half["combined"][..., :3]
+    for n in samples:
+        started = resource.getrusage(resource.RUSAGE_SELF)
+        try:
+            own = render_passes(room.scene, "CANDELA", n, 1, size=SIZE).images["combined"][..., :3]
+        except Exception as error:
+            found[str(n)] = {"failed": str(error) or type(error).__name__}
+            continue
+        spent = resource.getrusage(resource.RUSAGE_SELF)
+        found[str(n)] = judged(own, pixels, half, n) | {
+            "notes": [str(note) for note in ledger.latest().notes],
+            "seconds": spent.ru_utime - started.ru_utime,
+        }
+        if keep is not None:
+            from bench.cases import write_pictures
+
+            write_pictures(keep, f"{key(names).replace(' ', '_')}_{n}", own, pixels)
+    return found
+
+
+def judged(own: np.ndarray, truth: np.ndarray, half: np.ndarray, samples: int) -> dict:
+    """Error of a picture (H, W, 3) beside the mean of two references and half their difference."""
+    if not np.isfinite(own).all():
+        return {"failed": "values that are not finite"}
+    if own.shape != truth.shape:
+        return {"failed": f"a picture of {own.shape[1]}x{own.shape[0]} pixels beside {truth.shape[1]}x{truth.shape[0]}"}
+    mean, most, relmse = max(float(truth.mean()), 1e-6), *BOUNDS[samples]
+    error, floor = _of_blocks(own - truth, truth), _of_blocks(half, truth)
+    return {
+        "ratio": float(own.mean()) / mean, "blocks": error, "floor": floor, "negative": int((own < 0).sum()),
+        "good": bool(
+            abs(float(own.mean()) / mean - 1.0) <= most + abs(float(half.mean())) / mean and error <= relmse + 2 * floor
+        ),
+    }  # fmt: skip
+
+
+def _of_blocks(difference: np.ndarray, truth: np.ndarray) -> float:
+    """relMSE of the means of blocks."""
+    from addon.compare.metrics import LUMINANCE
+
+    apart, light = _blocks(difference), _blocks(truth) @ LUMINANCE
+    dark = max(DARK * float(light.mean()), 1e-6)
+    return float(((apart**2).mean(axis=-1) / (light**2 + dark**2)).mean())
+
+
+def _blocks(image: np.ndarray) -> np.ndarray:
+    height, width = (extent // BLOCK * BLOCK for extent in image.shape[:2])
+    parts = image[:height, :width].astype(np.float64).reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, -1)
+    return parts.mean(axis=(1, 3))
+
+
+def colour(one: dict) -> str:
+    """Of a result: whether it is right, warned of, or wrong without a word."""
+    if "failed" in one:
+        return RED
+    return GREEN if one["good"] else AMBER if one["notes"] else RED
+
+
+def line(names: tuple[str, ...], found: dict[str, dict]) -> str:
+    told = []
+    for n, one in sorted(found.items(), key=lambda item: int(item[0])):
+        if "failed" in one:
+            told.append(f"{n}: {one['failed']}")
+        else:
+            figures = f"{one['ratio']:.3f} {one['blocks']:.4f} (floor {one['floor']:.4f}, {one['seconds']:.1f} s)"
+            told.append(f"{n}: {colour(one)} {figures}")
+    return f"{key(names)}   {'   '.join(told)}"
+
+
+# ------------------------------------------------------------------------------------------------------------ results
+
+
+def read(path: Path = RESULTS) -> dict[str, dict[str, dict]]:
+    """Results by names of the features and number of samples."""
+    return json.loads(path.read_text("utf-8")) if path.is_file() else {}
+
+
+def summary(known: dict[str, dict[str, dict]]) -> list[list[str]]:
+    rows = [["samples", "drawn", GREEN, AMBER, RED]]
+    for n in sorted(BOUNDS):
+        colours = [colour(found[str(n)]) for found in known.values() if str(n) in found]
+        rows.append([str(n), str(len(colours)), *(str(colours.count(one)) for one in (GREEN, AMBER, RED))])
+    return rows
+
+
+def worst(known: dict[str, dict[str, dict]], most: int = 20) -> list[list[str]]:
+    """The pairs farthest from their bounds, and what was said of them."""
+    entries = []
+    for names, found in known.items():
+        for n, one in found.items():
+            if colour(one) != GREEN:
+                bound = BOUNDS[int(n)]
+                far = 1e9 if "failed" in one else max(abs(one["ratio"] - 1) / bound[0], one["blocks"] / bound[1])
+                entries.append((far, names, n, one))
+    rows = [["features", "samples", "", "mean over Cycles'", "relMSE of blocks", "said"]]
+    for _, names, n, one in sorted(entries, key=lambda entry: -entry[0])[:most]:
+        if "failed" in one:
+            rows.append([names, n, RED, "–", "–", one["failed"].strip().splitlines()[-1]])
+        else:
+            said = "; ".join(one["notes"])
+            rows.append([names, n, colour(one), f"{one['ratio']:.3f}", f"{one['blocks']:.4f}", said])
+    return rows
+
+
+def write_page(known: dict[str, dict[str, dict]]) -> None:
+    """The page's tables and its picture, of all pairs that are known."""
+    pairs = {names: found for names, found in known.items() if names.count(" + ") == 1}
+    draw(pairs)
+    if not PAGE.exists():
+        write_whole(PAGE, f"# Features that meet\n\n{begin(COMMAND)}\n<!-- end of what is written -->\n")
+    text = f"{table(summary(pairs))}\n\n![Pairs of features](images/{PICTURE.name})\n\n{table(worst(pairs, 30))}"
+    put_between(PAGE, COMMAND, text)
+
+
+def draw(pairs: dict[str, dict[str, dict]]) -> None:
+    """A triangle: 16 samples below the diagonal, 1 above it."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+    from matplotlib.colors import ListedColormap
+
+    names = list(FEATURES)
+    values = {GREEN: 1, AMBER: 2, RED: 3}
+    cells = np.zeros((len(names), len(names)))
+    for pair, found in pairs.items():
+        if not set(pair.split(" + ")) <= set(names):  # a feature that is no more
+            continue
+        first, second = (names.index(name) for name in pair.split(" + "))
+        for n, one in found.items():
+            row, column = (max(first, second), min(first, second))
+            cells[(row, column) if n == "16" else (column, row)] = values[colour(one)]
+    figure, axes = plt.subplots(figsize=(11, 11))
+    shades = ListedColormap(["#e8e8e8", "#5aa469", "#e0a030", "#c0392b"])
+    axes.imshow(cells, cmap=shades, vmin=0, vmax=3)
+    axes.set_xticks(range(len(names)), names, rotation=90, fontsize=8)
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    axes.set_title("16 samples below the diagonal, 1 sample above: green right, amber said, red wrong, grey not drawn")
+    figure.tight_layout()
+    figure.savefig(PICTURE, dpi=80)
+    plt.close(figure)
