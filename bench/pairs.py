@@ -1,8 +1,8 @@
 """Features that meet, beside Cycles: `python -m bench pairs`.
 
 Every pair of the features of bench/pair_features.py is drawn in one small room by Candela, with 1 and with 16 samples
-and all bounces, and by Cycles, whose pictures are kept by content. Judged are the ratio of means and relMSE of the means
-of 4x4 pixels, which noise of single pixels hardly moves:
+and all bounces, and by Cycles, whose pictures are kept by content. Judged are the ratio of means and relMSE of means
+over 4x4 pixels, which noise of single pixels hardly moves:
 
     green   within the bounds of its number of samples, to which the reference's own noise is added
     amber   beyond them, and a sentence said that something is drawn otherwise
