@@ -24,11 +24,13 @@ what is expected of a candidate, and its weight with it.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import ordered_lists
+from .media import MediaService, attenuated
 
 GROUP = 16  # candidates that share the next surfaces of their paths
 FLOOR = 1.0  # share of the mean importance that every candidate keeps
@@ -82,6 +84,12 @@ SLOTS = _pass(
 )  # fmt: skip
 
 
+NEXT_POINT = ("RGBA32F", "next_point")
+ALONE_IN_MEDIA, SHARED_IN_MEDIA = (
+    attenuated(replace(program, textures=(*program.textures, NEXT_POINT))) for program in (ALONE, SHARED)
+)
+
+
 def room_for(wanted: int) -> int:
     """Places for virtual lights of which about so many are kept."""
     return wanted + 2 * math.ceil(math.sqrt(wanted)) + 4
@@ -119,17 +127,22 @@ class Choice:
         self._held += [self.keys, self.numbers]
         return self.numbers
 
-    def radiances(self, found: dict[str, images.Image], pairs: images.Image | None) -> images.Image:
+    def radiances(
+        self, found: dict[str, images.Image], pairs: images.Image | None, media: MediaService | None = None
+    ) -> images.Image:
         """Radiance of each candidate in that order, from the images of those. `pairs`: how densely each of a group
-        (row) draws the next surface of each other (column); None: none is shared."""
+        (row) draws the next surface of each other (column); None: none is shared. `media`: between candidates and
+        next surfaces."""
         radiance, self.importance = self._take("RGBA32F"), self._take("RG32F")
         textures = {name: found[name] for _, name in _RADIANCE if name in found} | {"sorted_order": self.numbers}
-        program = ALONE
+        program = ALONE_IN_MEDIA if media else ALONE
         if pairs is not None:
             sums = self._take("R32F")
             passes.fullscreen(PAIR_SUMS, images.Target((sums,)), textures={"pairs": pairs})
             textures |= {"pairs": pairs, "pair_sums": sums}
-            program = SHARED
+            program = SHARED_IN_MEDIA if media else SHARED
+        if media:
+            textures |= {"next_point": found["next_point"], **media.bindings}
         target = images.Target((radiance, self.importance))
         passes.fullscreen(program, target, textures=textures, constants=self._constants)
         return radiance

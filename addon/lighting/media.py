@@ -110,6 +110,15 @@ class LightOfMedia(Service):
     add: Callable[[Frame, Technique, Rays, images.Target], None]
 
 
+def dimmed(frame: Frame, program: Program, textures: dict[str, images.Image]) -> Program:
+    """The same pass for what media the frame has, whose images are added to `textures`."""
+    service = frame.service(MediaService)
+    if service is None:
+        return program
+    textures |= service.bindings
+    return attenuated(program)
+
+
 def is_endless(frame: Frame) -> bool:
     """Whether a medium without an end takes all light that comes from infinity."""
     service = frame.service(MediaService)

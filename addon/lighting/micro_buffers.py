@@ -19,6 +19,7 @@ Jacobi iteration).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from ..gfx.library import Program
 from ..scene import acceleration
 from ..scene.point_tree import COVER
 from ..scene.view import VIEW
+from .media import MediaService, attenuated
 from .point_runs import CLIPS, ROW, TURN, PointRuns, Run
 
 PULLED = 7  # levels of a pass
@@ -58,6 +60,12 @@ ARRIVING = passes.fullscreen_program(
     constants=(("INT", "micro_side"), ("INT", "id_bits")),
     outputs=(("VEC4", "out_arriving"),),
 )
+ARRIVING_IN_MEDIA = attenuated(
+    replace(
+        ARRIVING, textures=(*ARRIVING.textures, BUFFER_TEXTURES[0]), defines=(("NODE_ROW", str(NODE_ROW)),),
+        constants=(*ARRIVING.constants, ("INT", "leaf_count"), ("INT", "group_count"), ("VEC4", "buffer_choice")),
+    )
+)  # fmt: skip
 SENT = passes.fullscreen_program(
     "light sent by points",
     "micro/leaf.frag.glsl",
@@ -171,10 +179,15 @@ class NodeRadiance:
                 )  # fmt: skip
                 frame.count(technique, "passes")
                 frame.count(technique, "gathers of points", active)
+                media = frame.service(MediaService)
+                program = ARRIVING if media is None else ARRIVING_IN_MEDIA
+                textures = {} if media is None else {"tree_nodes": run.nodes, **media.bindings}
+                constants |= {"group_count": groups}
                 for _ in range(bounces):
                     passes.fullscreen(
-                        ARRIVING, images.Target((arriving,)), textures={"micro": micro, "node_radiance": self.image},
-                        constants={name: constants[name] for name in ("micro_side", "id_bits")},
+                        program, images.Target((arriving,)),
+                        textures={"micro": micro, "node_radiance": self.image, **textures},
+                        constants={name: constants[name] for _, name in program.constants},
                     )  # fmt: skip
                     self._send(frame, technique, run, direct, arriving, shares, groups, sent)
                 frame.count(technique, "bounces", bounces)

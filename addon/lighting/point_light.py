@@ -23,6 +23,7 @@ from ..sampling.sequence import uniform
 from ..sources import lights
 from .emissive_triangles import EmissiveTriangles
 from .loop import lighting
+from .media import dimmed
 from .visibility import RAYS, ray_bindings
 
 FEW_POINTS = 16  # on each lamp, of the world and of emissive meshes, in a picture of few samples
@@ -67,10 +68,11 @@ class PointLight:
         rows = [*self._lamps(frame, number), *self._world(frame, number), *self._emitted(frame, number)]
         textures, constants = ray_bindings(frame)
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
+        program = dimmed(frame, LIGHTING, bound)
         for first in range(0, len(rows), lights.MOST_LIGHTS):
             some = rows[first : first + lights.MOST_LIGHTS]
             passes.fullscreen(
-                LIGHTING, target, blend="ADDITIVE_PREMULT",
+                program, target, blend="ADDITIVE_PREMULT",
                 textures={**bound, **textures, "energy_table": frame.materials.energy_table},
                 blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
                 constants={"light_count": len(some), "traced_roughness": -1.0, **constants},

@@ -51,7 +51,7 @@ from ..surfaces.reflectance import Reflectance
 from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
 from .light_choice import GROUP, Choice, seen_middle
-from .media import MediaService, attenuated
+from .media import MediaService, dimmed
 
 PROBES, DRAFT_PROBES = (16, 12), (12, 8)
 LEAST_RAYS, DRAFT_RAYS = 6, 3  # per probe
@@ -198,7 +198,7 @@ class VirtualLights:
             if frame.settings.bounces > 1 and not frame.settings.draft:
                 pairs = self._pairs(frame, grid, found, order)
                 held.append(pairs)
-            radiances = choice.radiances(found, pairs)
+            radiances = choice.radiances(found, pairs, frame.service(MediaService))
             slots, kept_before = choice.keep(count, frame.random("virtual lights/keep")[0])
             densities = self._densities(frame, grid, found, slots)
             held.append(densities)
@@ -310,14 +310,8 @@ class VirtualLights:
         """Images of the pool by the names of FOUND, a row per probe."""
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
-        program, bindings, media = (
-            candidates_program(self.kinds),
-            self._probing(frame, grid),
-            frame.service(MediaService),
-        )
-        if media is not None:
-            program = attenuated(program)
-            bindings["textures"] |= media.bindings
+        bindings = self._probing(frame, grid)
+        program = dimmed(frame, candidates_program(self.kinds), bindings["textures"])
         passes.fullscreen(program, found, **bindings)
         return {name if "next" in name else f"candidate_{name}": image for name, image in zip(FOUND, found.colors)}
 

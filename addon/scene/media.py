@@ -18,6 +18,7 @@ as at their rim. More than MOST_MEDIA are not drawn.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,6 +48,7 @@ PLACE = Struct(
     ("vec4", "color"),
     ("vec4", "facts"),  # random number, pass index, factor of all coefficients
 )
+_CHANGES = itertools.count(1)
 CORNERS = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
 BOX = np.array([
     (0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
@@ -314,6 +316,7 @@ class Media:
         if self._key is not None and self._key[0] == key:
             return
         self._key = (key, snapshot)  # the snapshot keeps alive what is told apart by identity
+        self.changes = next(_CHANGES)
         self.found, notes = filled(snapshot, compiled, origin)
         table = np.zeros((images.LIST_WIDTH, 4), np.float32)
         varying = [k for k, one in enumerate(self.found) if one.varies]

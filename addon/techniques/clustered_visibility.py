@@ -23,6 +23,7 @@ on.
 
 Bias (diffuse indirect light): that of multires_radiosity.py; sums that rays take below zero are cut there (up to + 2
 %). Without rays, light and visibility are taken as independent within a cluster, so gaps of doors leak.
+With volumes, "Convolution" is "Texels".
 
 Fails: grain where members of a cluster see different things and for blockers narrower than a texel (3 degrees with 64).
 
@@ -44,9 +45,10 @@ from ..frame.technique import Param
 from ..gfx import images, passes
 from ..kernels.convolution import PYRAMID, Basis, series
 from ..kernels.tables import level_program
+from ..lighting.media import MediaService
 from ..lighting.soft_maps import REFINE
 from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, BoundGather, Gather, VirtualLightSet
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import Note, Snapshot
 from ..sources import lights
 from ..sources.clusters import Clusters, cluster, members
 from .cssm import ORDERS, SEARCH_OFFSET
@@ -144,9 +146,14 @@ class ClusteredVisibility(MultiresRadiosity):
     def begin(self, frame: Frame) -> None:
         super().begin(frame)
         self._standing = None
+        if frame.settings.get(self, "shadows") == CONVOLUTION and frame.service(MediaService) is not None:
+            text = "its shadows are looked up texel by texel: convolution is not made for scenes with volumes."
+            frame.ledger.notes = (*frame.ledger.notes, Note(self.label, text))
 
     def visibility(self, frame: Frame, found: VirtualLightSet) -> BoundGather:
-        side, filtered = frame.settings.get(self, "map_size"), frame.settings.get(self, "shadows") == CONVOLUTION
+        # Maps of means and media are more images together than a program may have.
+        filtered = frame.settings.get(self, "shadows") == CONVOLUTION and frame.service(MediaService) is None
+        side = frame.settings.get(self, "map_size")
         if filtered:
             side = 1 << round(np.log2(side))
         label, areas = self._areas(frame, found)

@@ -26,14 +26,14 @@ Source: Dong, Kautz, Theobalt and Seidel, "Interactive Global Illumination Using
 | each sample | 1 pass, about 150 nodes per pixel of 2 fetches |
 
 Bias (diffuse indirect light): silhouettes, contacts and slits narrower than a surfel are blurred. Rough diffuse and
-gloss that surfels send count as even, glass and alpha as what they cover; media are left out. Fails: light through
+gloss that surfels send count as even, glass and alpha as what they cover. Fails: light through
 gaps, and on things, smaller than a surfel (`surfels` sets the number). Gloss is one ray per pixel, as in ssdo.py.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..frame.picture import Frame
 from ..frame.run import lights_key
@@ -42,6 +42,7 @@ from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting import surfels as surfel_light
+from ..lighting.media import MediaService, attenuated, dimmed
 from ..lighting.surfels import SurfelLight
 from ..lighting.virtual_lights import VirtualLights
 from ..scene import acceleration
@@ -92,6 +93,9 @@ GATHER = passes.fullscreen_program(
     constants=(("INT", "receiver_count"), ("INT", "bins")),
     defines=WIDE,
     outputs=(("VEC4", "out_arriving"), ("VEC4", "out_sent")),
+)
+GATHER_IN_MEDIA = attenuated(
+    replace(GATHER, textures=(*GATHER.textures, *TREE, ("RGBA32F", "receivers")), defines=(*GATHER.defines, *IN_TREE))
 )
 SHOW = passes.fullscreen_program(
     "light of surfels at pixels",
@@ -221,9 +225,10 @@ class ImplicitVisibility(Technique):
 
     def _solve(self, frame: Frame, surfels: Surfels, solution: Solution, number: int) -> Iterator[None]:
         bounces = min(frame.settings.bounces, MOST_BOUNCES)
+        media = frame.service(MediaService)
         wanted = (
             solution.linked_for, lights_key(frame.snapshot), frame.environment, frame.materials.fingerprint(), bounces,
-            self._shadows,
+            self._shadows, media and media.media.changes,
         )  # fmt: skip
         if _same(solution.lit_for, wanted):
             frame.count(self, "light kept", surfels.receiver_count)
@@ -244,6 +249,10 @@ class ImplicitVisibility(Technique):
             known = {"reflectance": self._light.reflectance, "direct": direct}
             passes.fullscreen(SEND, images.Target((sent[0],)), textures=known)
             constants = {"receiver_count": surfels.receiver_count, "bins": frame.settings.get(self, "bins")}
+            gather, links = GATHER, {"links": solution.links}
+            if media is not None:
+                gather = GATHER_IN_MEDIA
+                links |= {**_tree(surfels), "receivers": surfels.receivers, **media.bindings}
             for bounce in range(bounces):
                 before, after = sent[bounce % 2], sent[1 - bounce % 2]
                 passes.fullscreen(
@@ -252,8 +261,8 @@ class ImplicitVisibility(Technique):
                     constants={"node_count": surfels.node_count},
                 )  # fmt: skip
                 passes.fullscreen(
-                    GATHER, images.Target((solution.arriving, after)),
-                    textures={**known, "links": solution.links, "node_radiance": radiance}, constants=constants,
+                    gather, images.Target((solution.arriving, after)),
+                    textures={**known, **links, "node_radiance": radiance}, constants=constants,
                 )  # fmt: skip
                 yield
         finally:
@@ -267,9 +276,10 @@ class ImplicitVisibility(Technique):
         self._glossy.draw_sources(frame)
         bindings = self._glossy.path_bindings(frame)
         bindings["constants"] |= {"fan_count": 0, "step_count": 0, "farthest": 0.0, "thickness": 0.0}
+        program = dimmed(frame, GLOSSY, bindings["textures"])
         target = frame.target("radiance.glossy_indirect", depth=MARKS)
         for rows in frame.bands(self, "gloss"):
-            passes.fullscreen(GLOSSY, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
+            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield
         frame.count(self, "passes")
 

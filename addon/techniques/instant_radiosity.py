@@ -45,7 +45,7 @@ from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from ..lighting.media import MediaService, attenuated
+from ..lighting.media import dimmed
 from ..lighting.path_sources import shaded_roughness
 from ..lighting.virtual_lights import (
     PATH_BLOCKS,
@@ -209,10 +209,9 @@ class InstantRadiosity(Technique):
         bindings["constants"] |= self._reach(frame, -(-lights.wanted // SUBSETS))
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
-        program, media = gather_program(self.virtual_lights.kinds, *lobes_of(frame)), frame.service(MediaService)
-        if media is not None:
-            program = attenuated(program)
-            bindings["textures"] = bindings["textures"] | media.bindings
+        bindings["textures"] = dict(bindings["textures"])  # not of those who gather these lights, too
+        program = gather_program(self.virtual_lights.kinds, *lobes_of(frame))
+        program = dimmed(frame, program, bindings["textures"])
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield

@@ -9,7 +9,7 @@ grid (scene/media.py), another set for each pixel and sample. Intervals come fro
 
 The film multiplies what each of its points sees by T from the eye (film/filter.py): emission, the world, colours and
 light of surfaces alike, as Cycles' passes are. Passes that light surfaces multiply each light by T from there to the
-light (lighting/media.py).
+light, direct or from other surfaces (lighting/media.py).
 
 | cost | per film point | per light and pixel |
 |---|---|---|
@@ -17,7 +17,7 @@ light (lighting/media.py).
 | fetches | 1, + 20 per leaf of boundaries on the ray, + 4 per step in a grid | the same |
 
 Bias: of the exponential of a jittered sum, half its variance, at most some 1 % at 32 steps. Media behind glass and in
-mirrors, and between surfaces that light each other, take nothing away but what glass itself absorbs.
+mirrors take nothing away but what glass itself absorbs.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). 
 Bias (diffuse and glossy indirect light): a piece sends the light of one place on it as far as nothing stands between
 (shaders/micro/clips.frag.glsl); of meshes with more triangles than half of the points the smallest have discs, which
 reach over edges: leaves, grass and hair below the points' spacing are wrong. Points reflect gloss as diffuse; sheen and
-translucent lobes get none, clear glass is not there, rough diffuse counts as Lambertian, fog between dims nothing.
+translucent lobes get none, clear glass is not there, rough diffuse counts as Lambertian.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import lists
 from ..lighting import micro_buffers
+from ..lighting.media import dimmed
 from ..lighting.micro_buffers import (
     BUFFER_CONSTANTS,
     BUFFER_DEFINES,
@@ -205,7 +206,9 @@ class MicroRendering(MultiresRadiosity):
         textures = bindings["textures"] | listed
         columns = min(lists.columns((WIDEST // bindings["constants"]["micro_side"], 0), 1), 512)
         rows = -(-frame.size[0] * frame.size[1] // columns)
-        yield from self._dispatch(REGIONS, bindings, textures, grid, atlas, (columns, rows), {"list_width": columns})
+        yield from self._dispatch(
+            frame, REGIONS, bindings, textures, grid, atlas, (columns, rows), {"list_width": columns}
+        )
 
     def _gather_levels(self, frame: Frame, bindings, bound, grid: dict, atlas, flags: list) -> Iterator[None]:
         levels, anything = len(flags), bindings["textures"]["tree_nodes"]  # for what a level does not look at
@@ -216,7 +219,7 @@ class MicroRendering(MultiresRadiosity):
             }
             size = _level_size(frame.size, level, levels)
             constants = {"region_level": level, "levels": levels}
-            yield from self._dispatch(REGIONS_OF_LEVEL, bindings, textures, grid, atlas, size, constants)
+            yield from self._dispatch(frame, REGIONS_OF_LEVEL, bindings, textures, grid, atlas, size, constants)
 
     def _gather_lobes(self, frame: Frame, run: Run, bindings, settings: dict) -> Iterator[None]:
         """Reflections of microfacets, each pixel's own."""
@@ -229,7 +232,7 @@ class MicroRendering(MultiresRadiosity):
         gathered = images.pool.take(*frame.size, "RGBA32F")
         images.Target((gathered,)).clear()
         try:
-            yield from self._dispatch(GLOSSY, bindings, bindings["textures"], {}, gathered, frame.size, {})
+            yield from self._dispatch(frame, GLOSSY, bindings, bindings["textures"], {}, gathered, frame.size, {})
             target = frame.target("radiance.glossy_indirect")
             passes.fullscreen(
                 passes.COPY, target, blend="ADDITIVE_PREMULT", textures={"original": gathered}
@@ -240,9 +243,10 @@ class MicroRendering(MultiresRadiosity):
         frame.count(self, "passes")
 
     def _dispatch(
-        self, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
+        self, frame: Frame, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
     ) -> Iterator[None]:  # fmt: skip
         """Block after block, so that micro-buffers take little memory, fit an image, and no dispatch takes long."""
+        program = dimmed(frame, program, textures := dict(textures))
         side, leaves = (bindings["constants"][name] for name in ("micro_side", "leaf_count"))
         width, height = size
         columns = min(WIDEST // side, width)

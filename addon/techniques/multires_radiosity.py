@@ -42,6 +42,7 @@ from ..frame.technique import Param
 from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..kernels import lists
+from ..lighting.media import dimmed
 from ..lighting.virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -204,6 +205,7 @@ class MultiresRadiosity(InstantRadiosity):
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
         program = shared_gather_program(self.virtual_lights.kinds, *lobes_of(frame))
+        program = dimmed(frame, program, bindings["textures"])
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield
@@ -319,8 +321,8 @@ class MultiresRadiosity(InstantRadiosity):
         self, frame: Frame, bindings, bound: BoundGather, grid: dict, atlas: images.Image, listed: dict
     ) -> Iterator[None]:
         columns = lists.columns(frame.size, 8)
-        program = regions(bound.gather)
         textures = bindings["textures"] | bound.textures | listed
+        program = dimmed(frame, regions(bound.gather), textures)
         constants = bindings["constants"] | bound.constants | grid | {"columns": columns}
         for first, last in frame.bands(self, "regions"):
             passes.compute(
@@ -334,11 +336,11 @@ class MultiresRadiosity(InstantRadiosity):
     ) -> Iterator[None]:
         """The same level by level, without a list; with no levels, all pixels."""
         levels = len(flags)
-        program = regions(bound.gather, listed=False)
+        program = dimmed(frame, regions(bound.gather, listed=False), textures := {})
         anything = bindings["textures"]["virtual_lights"]  # for what a level does not look at
         for level in range(levels, -1, -1):
             width, height = _level_size(frame.size, level, levels)
-            textures = bindings["textures"] | bound.textures
+            textures |= bindings["textures"] | bound.textures
             textures["region_flags"] = flags[level - 1] if level > 0 else anything
             textures["coarser_flags"] = flags[level] if level < levels else anything
             constants = bindings["constants"] | bound.constants | grid | {"level": level, "levels": levels}

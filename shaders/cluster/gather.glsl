@@ -4,6 +4,7 @@
 #include "cluster/visibility.glsl"
 
 #define LEAST_DOUBT 0.1  // of every cluster: what maps are sure of may be wrong
+#define LEAST_PASSING 0.02  // through media: of members that stand nearer than the middle more may
 
 // What a virtual light brings to a surface if nothing is between.
 vec3 member_light(int index, Surface s, out vec3 direction)
@@ -11,6 +12,14 @@ vec3 member_light(int index, Surface s, out vec3 direction)
   VirtualLight light = virtual_light(index);
   float bounded = bounded_kernel(light, s.position, near_radius, direction) * max(dot(s.normal, direction), 0.0);
   return light.intensity * ((dot(direction, s.geometric_normal) > 0.0) ? bounded : 0.0);
+}
+
+// Share that media let pass from a place of the cluster.
+vec3 passing_from(vec3 place, vec3 origin, uint salt)
+{
+  vec3 path = place - origin;
+  float reach = length(path);
+  return passing_media(origin, path / max(reach, 1e-30), reach, salt);
 }
 
 // Light of one member, drawn in proportion to what it brings, that stands for all: `total` is the sum of luminances.
@@ -23,7 +32,9 @@ vec3 traced_member(Cluster c, Surface s, vec3 origin, float total, float u, uint
     float share = luminance(abs(light));
     passed += share;
     if (share > 0.0 && u * total < passed) {
-      return light * (total / share * virtual_light_seen(virtual_light(i), origin, salt));
+      VirtualLight member = virtual_light(i);
+      light *= total / share * virtual_light_seen(member, origin, salt);
+      return light * passing_from(member.position, origin, salt);
     }
   }
   return vec3(0.0);
@@ -57,10 +68,11 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
         continue;
       }
       float doubt;
-      vec3 guess = unblocked * cluster_visibility(c, s.position, s.geometric_normal, doubt);
+      vec3 passing = passing_from(c.middle, origin, salt + uint(k));
+      vec3 guess = unblocked * passing * cluster_visibility(c, s.position, s.geometric_normal, doubt);
       sum += guess;
       takes_light = takes_light || any(lessThan(unblocked, vec3(0.0)));
-      doubt = total * max(doubt, LEAST_DOUBT);
+      doubt = total * max(doubt, LEAST_DOUBT) * max(max_component(passing), LEAST_PASSING);
       doubts += doubt;
       roll = hash3(roll);
       if (to_unit(roll.x) * doubts < doubt) {

@@ -2,6 +2,20 @@
 // since bins have equal projected solid angles; and what the receiver sends of it and of the direct light.
 #include "lib/math.glsl"
 #include "implicit_visibility/surfels.glsl"
+#ifdef MEDIA
+#include "media/media.glsl"
+
+// What media let pass on a link.
+vec3 passing_link(int receiver, int node, int bin)
+{
+  int i = receiver * RECEIVER_TEXELS;
+  vec3 origin = receivers_fetch(ivec2(i & 2047, i >> 11)).xyz;
+  vec3 path = surfel_node(node, 0).xyz - origin;
+  float reach = length(path);
+  uint salt = hash3(uvec3(uint(receiver), uint(bin), 57u)).x;
+  return media_transmittance(origin, path / max(reach, 1e-30), reach, salt);
+}
+#endif
 
 void main()
 {
@@ -19,7 +33,11 @@ void main()
   for (int bin = 0; bin < count; bin++) {
     int entry = int(links_fetch(ivec2(first.x + bin, first.y)).x) - 1;
     if (entry >= 0) {
-      sum += node_radiance_fetch(ivec2(entry & 2047, entry >> 11)).rgb;
+      vec3 radiance = node_radiance_fetch(ivec2(entry & 2047, entry >> 11)).rgb;
+#ifdef MEDIA
+      radiance *= passing_link(receiver, entry >> 1, bin);
+#endif
+      sum += radiance;
       linked += 1.0;
     }
   }

@@ -61,6 +61,15 @@ void main()
     if (!trace_vertex(origin, direction, 1e29, roll.z, met, t)) {
       break;
     }
+    if (bounce > 1) {
+      vec3 passing = passing_media(origin, direction, t, roll.y);
+      if (bounce == 2) {
+        lobe *= passing;  // the rest where candidates share what they have met (choice_radiance.frag.glsl)
+      }
+      else {
+        throughput *= passing;
+      }
+    }
     if (bounce == 1) {
       out_point = vec4(met.position, (dot(met.lit, met.normal) > 0.0) ? 1.0 : -1.0);  // 1: lit on the side that it lights
       out_normal = vec4(met.normal, 0.0);

@@ -2,16 +2,30 @@
 // allowed. With PAIRS, what a path brings from its next surface is shared in a group, by the balance heuristic.
 // Second: the importance of the candidate, and 1 if it has any.
 #include "indirect/choice.glsl"
+#ifdef MEDIA
+#include "media/media.glsl"
+#endif
 
 bool all_finite(vec4 v)
 {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z) && is_finite(v.w);
 }
 
-vec4 later_of(int index)
+// What comes to candidate `own` from the next surface of candidate `index`.
+vec4 later_of(int index, int own)
 {
   ivec2 place = candidate_place(index);
   vec4 later = vec4(next_radiance_fetch(place).xyz, candidate_albedo_fetch(place).w);
+#ifdef MEDIA
+  vec3 origin = candidate_point_fetch(candidate_place(own)).xyz;
+  vec3 path = next_point_fetch(place).xyz - origin;
+  float reach = length(path);
+  float sent = luminance(abs(later.xyz));
+  if (sent > 0.0) {
+    later.xyz *= media_transmittance(origin, path / max(reach, 1e-30), reach, uint(index * candidate_count + own));
+    later.w *= luminance(abs(later.xyz)) / sent;
+  }
+#endif
   return all_finite(later) ? later : vec4(0.0);
 }
 
@@ -24,7 +38,7 @@ void main()
   if (own >= candidate_count || candidate_point_fetch(candidate_place(own)).w == 0.0) {
     return;
   }
-  vec4 later = later_of(own);
+  vec4 later = later_of(own, own);
 #ifdef PAIRS
   int index = place.y * LIST_COLUMNS + place.x;
   int first = index / GROUP * GROUP;
@@ -33,7 +47,7 @@ void main()
     ivec2 member = ivec2((first + k) % LIST_COLUMNS, (first + k) / LIST_COLUMNS);
     float density = pairs_fetch(ivec2(k, index)).x;
     if (density > 0.0) {
-      later += later_of(int(sorted_order_fetch(member).x)) * (density / pair_sums_fetch(member).x);
+      later += later_of(int(sorted_order_fetch(member).x), own) * (density / pair_sums_fetch(member).x);
     }
   }
 #endif

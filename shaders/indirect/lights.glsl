@@ -51,6 +51,15 @@ float virtual_light_seen(VirtualLight light, vec3 origin, uint salt)
   return clear_path(origin, path / max(reach, 1e-30), reach, salt);
 }
 
+// Intensity of a virtual light that comes through surfaces and media to a place beside a surface.
+vec3 virtual_light_arriving(VirtualLight light, vec3 origin, uint salt)
+{
+  vec3 path = light.position - origin;
+  float reach = length(path);
+  vec3 direction = path / max(reach, 1e-30);
+  return light.intensity * virtual_light_seen(light, origin, salt) * passing_media(origin, direction, reach, salt);
+}
+
 // Irradiance at a surface by virtual lights; `shorter`: by the light in them that may be reflected once more. Every n-th of
 // them stands for n, such that no more than PART are looked at; one of those is traced, along `direction`.
 #ifndef PART
@@ -80,6 +89,6 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, float reach, bool shorter, u
   VirtualLight light = virtual_light(chosen);
   float part = shorter ? virtual_lights_fetch(ivec2(chosen, 1)).w : 1.0;
   float bounded = bounded_kernel(light, position, reach, direction) * max(dot(normal, direction), 0.0);
-  float visible = virtual_light_seen(light, ray_origin(position, normal), salt);
-  return light.intensity * (part * bounded * (float(stride) * total / chosen_share) * visible);
+  return virtual_light_arriving(light, ray_origin(position, normal), salt)
+         * (part * bounded * (float(stride) * total / chosen_share));
 }

@@ -123,6 +123,16 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   return true;
 }
 
+// What media let pass of light that comes along a ray from `limit`.
+vec3 passing_media(vec3 origin, vec3 direction, float limit, uint salt)
+{
+#ifdef MEDIA
+  return media_transmittance(origin, direction, min(limit, FARTHEST_MEDIUM), salt);
+#else
+  return vec3(1.0);
+#endif
+}
+
 // Whether the entry that has just raised the `total` to what it is takes the place of the one drawn so far, such that of
 // all that have passed each stays in proportion to its share (Chao 1982). `roll` is another random number for each entry:
 // one number stretched over all of them would run out of digits where shares differ by powers of ten.
@@ -197,10 +207,7 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
-#ifdef MEDIA
-      float reach = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
-      chosen_light *= media_transmittance(origin, chosen_direction, reach, salt);
-#endif
+      chosen_light *= passing_media(origin, chosen_direction, light_distance(light, origin, chosen_direction), salt);
       Reflection reflection = met.reflection;
 #ifdef MIRRORS_OWNED
       if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {

@@ -27,7 +27,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
     for (int i = first; i < virtual_count; i += SUBSETS) {
       VirtualLight light = virtual_light(i);
       float bounded = bounded_kernel(light, s.position, near_radius, direction) * max(dot(s.normal, direction), 0.0);
-      sum += bounded * light.intensity;
+      sum += bounded * light.intensity * passing_media(origin, direction, distance(light.position, origin), salt + uint(i));
     }
     return (reflected ? sum * s.diffuse / PI : sum) * float(SUBSETS);
   }
@@ -46,7 +46,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
   float step_size = total / float(rays);
   int part = 0;
   int traced = -1;
-  float visible = 0.0;
+  vec3 intensity = vec3(0.0);
   for (int ray = 0; ray < rays; ray++) {
     float mark = (u + float(ray)) * step_size;
     while (part < PARTS - 1 && passed[part] <= mark) {
@@ -72,13 +72,10 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       continue;
     }
     if (chosen != traced) {
-      visible = virtual_light_seen(light, origin, salt + uint(chosen));
+      intensity = virtual_light_arriving(light, origin, salt + uint(chosen));
       traced = chosen;
     }
-    vec3 arriving = light.intensity * (bounded * step_size / chosen_share * visible);
-#ifdef MEDIA
-    arriving *= media_transmittance(origin, direction, distance(light.position, origin), salt);
-#endif
+    vec3 arriving = intensity * (bounded * step_size / chosen_share);
     sum += arriving * (reflected ? surface_diffuse_reflection(s, to_viewer, direction)
                                  : vec3(max(dot(s.normal, direction), 0.0)));
   }

@@ -98,6 +98,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
         continue;
       }
       float seen = map_visibility(i, light, s.position, s.geometric_normal);
+      light.intensity *= passing_media(origin, direction, distance(light.position, origin), salt + uint(i));
       of_group += light.intensity * (bounded * seen);
       if (rays > 0) {
         roll = hash3(roll);

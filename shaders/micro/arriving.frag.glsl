@@ -1,5 +1,8 @@
 // Irradiance at the points that gather for their groups, from their micro-buffers.
 #include "lib/math.glsl"
+#ifdef MEDIA
+#include "micro/gathering.glsl"
+#endif
 #define NOTHING 0xffffffffu
 #define MICRO_WORD(texel) (micro_fetch(texel).x)
 
@@ -12,5 +15,11 @@ vec4 radiance_texel(uint index)
 
 void main()
 {
-  out_arriving = micro_sum(ivec2(gl_FragCoord.xy) * micro_side);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec3 place = vec3(0.0);
+#ifdef MEDIA
+  vec3 axis;
+  place = leaf_middle(gathering_leaf((pixel.y * NODE_ROW + pixel.x) >> 1), axis);
+#endif
+  out_arriving = micro_sum(pixel * micro_side, place);
 }

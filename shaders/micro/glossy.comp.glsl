@@ -4,6 +4,8 @@
 #include "lib/brdf.glsl"
 #include "lib/random.glsl"
 #include "micro/buffer.glsl"
+#define MICRO_WORD(texel) (imageLoad(micro, texel).x)
+#include "micro/sum.glsl"
 
 void main()
 {
@@ -47,7 +49,8 @@ void main()
     uint word = imageLoad(micro, corner + of_buffer).x;
     vec3 ray = micro_ray(f, of_buffer, weight);
     if (word != NOTHING && max_component(weight) > 0.0 && may_mirror(s, ray)) {
-      sum += weight * radiance_texel(word & ((1u << uint(id_bits)) - 1u)).rgb;
+      vec3 radiance = radiance_texel(word & ((1u << uint(id_bits)) - 1u)).rgb;
+      sum += weight * radiance * MICRO_PASSING(f.place, word, i);
     }
   }
   imageStore(gathered, pixel, vec4(sum / float(count), 0.0));

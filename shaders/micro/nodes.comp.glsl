@@ -4,6 +4,7 @@
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "micro/buffer.glsl"
+#include "micro/gathering.glsl"
 
 void main()
 {
@@ -14,13 +15,8 @@ void main()
   int listed = int(gathering_fetch(place).x);
   int entry = abs(listed) - 1;
   place = ivec2(entry % NODE_ROW, entry / NODE_ROW);
-  int group_size = leaf_count / group_count;
-  int leaf = leaf_count + (entry >> 1) * group_size + min(int(buffer_choice.x * float(group_size)), group_size - 1);
-  vec3 axis = octahedral_decode(node_texel(3 * leaf + 1).xy);
-  vec4 sides = node_texel(3 * leaf + 2);
-  vec3 along = octahedral_decode(sides.xy);
-  // Of a piece of a triangle its middle, not that of its longest edge.
-  vec3 middle = node_texel(3 * leaf).xyz + ((sides.w > 0.0) ? (sides.z * along + sides.w * cross(axis, along)) / 3.0 : vec3(0.0));
+  vec3 axis;
+  vec3 middle = leaf_middle(gathering_leaf(entry >> 1), axis);
   vec3 normal = axis * (((entry & 1) == 0) ? 1.0 : -1.0);
   uvec3 salt = hash3(uvec3(uint(entry), 71u, 3u));
   vec3 own = fract(buffer_choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));

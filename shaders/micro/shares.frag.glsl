@@ -5,23 +5,11 @@
 // Rays between both points run in an arch, as high as RISE of their distance: a bent surface does not hide its own points.
 #include "lib/math.glsl"
 #include "trace/rays.glsl"
+#include "micro/gathering.glsl"
 
 #define RISE 0.25
 #define ALIKE 0.7
 #define CANDIDATES 8
-
-vec4 tree_texel(int index)
-{
-  return tree_nodes_fetch(ivec2(index & 2047, index >> 11));
-}
-
-vec3 leaf_middle(int leaf, out vec3 axis)
-{
-  axis = octahedral_decode(tree_texel(3 * leaf + 1).xy);
-  vec4 sides = tree_texel(3 * leaf + 2);
-  vec3 along = octahedral_decode(sides.xy);
-  return tree_texel(3 * leaf).xyz + ((sides.w > 0.0) ? (sides.z * along + sides.w * cross(axis, along)) / 3.0 : vec3(0.0));
-}
 
 void main()
 {
@@ -40,8 +28,7 @@ void main()
       continue;
     }
     vec3 other_axis;
-    int gathering = leaf_count + group * group_size + min(int(buffer_choice.x * float(group_size)), group_size - 1);
-    vec3 other = leaf_middle(gathering, other_axis);
+    vec3 other = leaf_middle(gathering_leaf(group), other_axis);
     // A bent group may have a gathering point that faces another way.
     if (k > 0 && dot(axis, other_axis) < ALIKE) {
       continue;

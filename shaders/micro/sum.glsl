@@ -1,12 +1,31 @@
 // Irradiance from a micro-buffer: all pixels have the same share. Alpha: the share of the hemisphere that is filled.
 // A program that includes this defines MICRO_WORD(texel), what a pixel of micro-buffers holds, and `radiance_texel`.
-vec4 micro_sum(ivec2 corner)
+#ifdef MEDIA
+#include "media/media.glsl"
+
+// What media let pass between a place and the middle of the node that a pixel shows.
+vec3 micro_passing(vec3 place, uint word, int pixel)
+{
+  int index = 3 * int((word & ((1u << uint(id_bits)) - 1u)) >> 1u);
+  vec3 path = tree_nodes_fetch(ivec2(index & 2047, index >> 11)).xyz - place;
+  float reach = length(path);
+  uvec3 salt = hash3(uvec3(floatBitsToUint(place.x), floatBitsToUint(place.y), word + uint(pixel)));
+  return media_transmittance(place, path / max(reach, 1e-30), reach, salt.x);
+}
+#define MICRO_PASSING(place, word, pixel) micro_passing(place, word, pixel)
+#else
+#define MICRO_PASSING(place, word, pixel) vec3(1.0)
+#endif
+
+// `place`: from where it was drawn.
+vec4 micro_sum(ivec2 corner, vec3 place)
 {
   vec4 sum = vec4(0.0);
   for (int i = 0; i < micro_side * micro_side; i++) {
     uint word = MICRO_WORD(corner + ivec2(i % micro_side, i / micro_side));
     if (word != NOTHING) {
-      sum += vec4(radiance_texel(word & ((1u << uint(id_bits)) - 1u)).rgb, 1.0);
+      vec3 radiance = radiance_texel(word & ((1u << uint(id_bits)) - 1u)).rgb;
+      sum += vec4(radiance * MICRO_PASSING(place, word, i), 1.0);
     }
   }
   return sum * vec4(vec3(PI), 1.0) / float(micro_side * micro_side);

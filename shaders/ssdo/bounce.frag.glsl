@@ -22,8 +22,9 @@ vec3 fan_light(Fan fan, Surface s, vec2 u, out uint open)
     uint seen = found.front & ~taken;
     taken |= found.sectors;
     if (seen != 0u && found.faces) {
-      vec3 direction = safe_normalize(found.position - fan.origin);
-      vec3 radiance = senders_fetch(found.texel).rgb;
+      vec3 path = found.position - fan.origin;
+      vec3 direction = safe_normalize(path);
+      vec3 radiance = senders_fetch(found.texel).rgb * passing_to(fan.origin, direction, length(path));
       sum += radiance * diffuse_weight(s, fan.toward, direction) * float(bitCount(seen));
       open &= ~seen;
     }

@@ -26,7 +26,8 @@ void main()
       float leaving = max(-dot(found.normal, direction), 0.0);
       float arriving = max(dot(s.normal, direction), 0.0);
       float solid_angle = min(area * leaving / (range * range), 2.0 * PI / float(points));
-      sum += senders_fetch(found.texel).rgb * diffuse_weight(s, viewer, direction)
+      sum += senders_fetch(found.texel).rgb * passing_to(s.position, direction, range)
+             * diffuse_weight(s, viewer, direction)
              * (found.share * arriving * solid_angle);
     }
   }

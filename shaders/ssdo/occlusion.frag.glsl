@@ -34,6 +34,7 @@ vec3 fan_environment(Fan fan, Surface s, uint hidden, vec2 u, uint salt)
     if (open != 0u) {
       vec3 direction = fan_direction(fan, (float(group) + u.x) * (float(GROUP) / 32.0));
       vec3 light = environment_radiance(direction) * diffuse_weight(s, fan.toward, direction) * float(bitCount(open));
+      light *= passing_to(s.position, direction, 1e29);
       sum += light;
       float share = luminance(abs(light)) / max(luminance(abs(sum)), 1e-30);
       bool taken = u.y < share;

@@ -13,6 +13,7 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
     if (!trace_vertex(origin, direction, 1e29, roll.z, met, t)) {
       break;
     }
+    throughput *= passing_media(origin, direction, t, roll.y);
     roll = hash3(roll);
 #ifdef MIRRORS_OWNED
     met.photons = met.photons && bounce == 0;
