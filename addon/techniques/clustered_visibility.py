@@ -24,7 +24,6 @@ on.
 Bias (diffuse indirect light): that of multires_radiosity.py; sums that rays take below zero are cut there (up to + 2
 %). Without rays, light and visibility are taken as independent within a cluster, so gaps of doors leak.
 With volumes, "Convolution" is "Texels".
-
 Fails: grain where members of a cluster see different things and for blockers narrower than a texel (3 degrees with 64).
 
 Auto takes it for pictures of one sample from 60 000 pixels on. Figures: docs/log/2026-11-26-indirect-light.md. Source:
