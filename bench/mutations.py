@@ -10,6 +10,7 @@ first one fails. What is printed:
 
 Before anything is changed the tests must pass on the copy: a test that always fails notices nothing. That run is made
 once per set of tests and kept for the time of the command. Results go to out/mutations.json, as far as they came.
+`--drawn N` takes wrongs that are drawn at random instead of the list, and tells the share that is noticed by room.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench import drawn_mutations
 from bench.cells import ROOT
-from bench.markdown import write_whole
+from bench.markdown import table, write_whole
 
 LIST = ROOT / "bench" / "mutations.toml"
 RESULTS = ROOT / "out" / "mutations.json"
@@ -36,7 +38,8 @@ SECONDS = 240  # for the tests of one wrong; longer than that counts as noticed:
 
 @dataclass(frozen=True)
 class Mutation:
-    """One wrong: `old` becomes `new` in `file`; `tests` are arguments for pytest. `reason`: why it is equivalent."""
+    """One wrong: `old` becomes `new` in `file`; `tests` are arguments for pytest. `reason`: why it is equivalent. `at`:
+    where in the file, in characters, if `old` may stand there more than once."""
 
     name: str
     file: str
@@ -44,9 +47,13 @@ class Mutation:
     new: str
     tests: tuple[str, ...] = ()
     reason: str = ""
+    at: int = -1
 
     def applied(self, text: str) -> str | None:
         """The text with the wrong in it; None where the place is not there, or not once."""
+        if self.at >= 0:
+            end = self.at + len(self.old)
+            return text[: self.at] + self.new + text[end:] if text[self.at : end] == self.old else None
         return text.replace(self.old, self.new) if text.count(self.old) == 1 else None
 
 
@@ -129,14 +136,44 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", metavar="TEXT", nargs="+", help="mutations whose name or file has one of these texts")
     parser.add_argument("--part", metavar="K/N", default="1/1", help="every Nth mutation, from the Kth on")
     parser.add_argument("--list", action="store_true", help="print the mutations and end")
+    parser.add_argument(
+        "--drawn", metavar="N", type=int, default=0, help="N wrongs drawn at random instead of the list"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of those that are drawn")
 
 
 def chosen(options: argparse.Namespace) -> list[Mutation]:
     first, _, step = options.part.partition("/")
-    found = [
-        one for one in read() if not options.only or any(text in f"{one.name} {one.file}" for text in options.only)
-    ]
+    if options.drawn:
+        found = drawn(options.drawn, options.seed, options.only)
+    else:
+        found = [
+            one for one in read() if not options.only or any(text in f"{one.name} {one.file}" for text in options.only)
+        ]
     return found[int(first) - 1 :: int(step or 1)]
+
+
+def drawn(count: int, seed: int, only: list[str] | None) -> list[Mutation]:
+    """Wrongs that bench/drawn_mutations.py draws, named by their place."""
+    made = []
+    for file, at, old, new, kind in drawn_mutations.drawn(count, seed, only):
+        number = (ROOT / file).read_text("utf-8").count("\n", 0, at) + 1
+        name = f"{file}:{number} {kind} {old} -> {new}"
+        made.append(Mutation(name, file, old, new, drawn_mutations.tests_for(file), at=at))
+    return made
+
+
+def by_room(states: dict[str, str]) -> list[list[str]]:
+    """Share of the wrongs that tests noticed, by room of the house."""
+    rows = [["room", "drawn", "noticed", "share"]]
+    rooms: dict[str, list[str]] = {}
+    for name, state in states.items():
+        if state in (KILLED, SURVIVED):
+            rooms.setdefault("/".join(name.split("/")[:2]), []).append(state)
+    for room, found in sorted(rooms.items()):
+        noticed = found.count(KILLED)
+        rows.append([room, str(len(found)), str(noticed), f"{100 * noticed / len(found):.0f} %"])
+    return rows
 
 
 def command(options: argparse.Namespace) -> int:
@@ -163,4 +200,6 @@ def command(options: argparse.Namespace) -> int:
     print(f"{killed} of {len(states)} noticed, {equal} equivalent, {len(stale)} stale, {len(left)} survived")
     for name in left:
         print(f"  survived: {name}")
+    if options.drawn:
+        print(table(by_room(states)))
     return 1 if left else 0

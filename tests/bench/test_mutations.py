@@ -68,3 +68,16 @@ def test_the_working_tree_is_copied_without_what_git_ignores(tmp_path):
     mutations.copy_of_tree(tmp_path)
     assert (tmp_path / "bench" / "mutations.toml").is_file() and (tmp_path / "pyproject.toml").is_file()
     assert not list(tmp_path.rglob("__pycache__")) and not (tmp_path / ".git").exists()
+
+
+def test_drawn_wrongs_are_the_same_for_a_seed_and_change_code_alone():
+    found = mutations.drawn(40, 3, None)
+    assert found == mutations.drawn(40, 3, None) and len({one.name for one in found}) == 40
+    for one in found:
+        text = (mutations.ROOT / one.file).read_text("utf-8")
+        wrong = one.applied(text)
+        assert wrong is not None and wrong != text and one.tests
+        start = text.rfind("\n", 0, one.at) + 1
+        assert "//" not in text[start : one.at], "a comment"
+        if one.file.endswith(".py"):
+            compile(wrong, one.file, "exec")
