@@ -57,7 +57,7 @@ check: environment ## format, lint, every shader compiled, fast tests
 	$(PYTHON) -m ruff check --quiet .
 	$(PYTHON) -m pytest -q $(PARALLEL) -m "not window and not timing and not slow"
 
-matrix: environment ## fast tests with each supported Blender (VERSIONS="5.0 4.5"), and the result in the README
+matrix: environment ## fast tests with each supported Blender (VERSIONS="5.0 4.5"), and the result on docs/versions.md
 	$(PYTHON) tools/matrix.py $(VERSIONS)
 
 mutations: environment ## small wrongs that the tests must notice

@@ -1,8 +1,8 @@
-"""How old the generated pages are: `python -m bench ages`, which writes the table in the README.
+"""How old the generated pages are: `python -m bench ages`, which writes the table on docs/versions.md.
 
 Each page, or the part of one that a command writes, carries the commit and the date at which its figures were made.
 Here the commits to `addon` and `shaders` since then are counted. A page that more than OLD of them have passed may say
-what is not true any more; the README names it, and a test fails while it does not.
+what is not true any more; the table names it, and a test fails while it does not.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from bench.cells import ROOT
 
 OLD = 30  # commits to the code
 CODE = ("addon", "shaders")
-README = ROOT / "README.md"
+TABLE = ROOT / "docs" / "versions.md"
 COMMAND = "python -m bench ages"
 STAMP = re.compile(r"Made on (\d{4}-\d\d-\d\d) at commit ([0-9a-f]{7,40})\b")
 PAGES = {  # and the commands that write them
@@ -90,8 +90,9 @@ def table() -> str:
     rows = [("page", "made by", "on", "at commit", "")]
     for page, command in PAGES.items():
         made = oldest(page)
-        rows.append((f"[{Path(page).stem.replace('_', ' ')}]({page})", f"`{command}`", made.date, made.commit,
-                     "older than the code that it describes" if made.old else ""))  # fmt: skip
+        name, link = Path(page).stem.replace("_", " "), Path(page).relative_to("docs")
+        old = "older than the code that it describes" if made.old else ""
+        rows.append((f"[{name}]({link})", f"`{command}`", made.date, made.commit, old))
     return markdown.table(rows)
 
 
@@ -99,13 +100,13 @@ def table() -> str:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--print", action="store_true", dest="only_print", help="print the table and leave the README")
+    parser.add_argument("--print", action="store_true", dest="only_print", help="print the table and leave the page")
 
 
 def command(options: argparse.Namespace) -> int:
     if options.only_print:
         print(table())
     else:
-        markdown.put_between(README, COMMAND, table(), stamped=False)
-        print(README)
+        markdown.put_between(TABLE, COMMAND, table(), stamped=False)
+        print(TABLE)
     return 0

@@ -32,3 +32,10 @@ def test_links_of_pages_lead_somewhere(page):
     targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
     files = [target for target in targets if "://" not in target]
     assert not [target for target in files if not (page.parent / target).exists()]
+
+
+def test_the_readme_is_short_and_its_commands_exist():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    assert set(re.findall(r"`?\bmake ([a-z-]+)", text)) <= targets

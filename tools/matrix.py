@@ -3,7 +3,7 @@
     python3 tools/matrix.py [VERSION …]
 
 Each version runs in its own environment (tools/environment.py). The last result of each, with date and commit, is kept
-in bench/results/matrix.json and shown in the README; a version without a result is shown as not run.
+in bench/results/matrix.json and shown on docs/versions.md; a version without a result is shown as not run.
 """
 
 import datetime as dt
@@ -21,7 +21,7 @@ from environment import FOLDER_OF, python_in  # noqa: E402
 from bench.markdown import put_between, table, write_whole  # noqa: E402
 
 RESULTS = ROOT / "bench" / "results" / "matrix.json"
-README = ROOT / "README.md"
+PAGE = ROOT / "docs" / "versions.md"
 COMMAND = "make matrix"
 TESTS = ["-q", "-n", "2", "--dist", "worksteal", "-m", "not window and not timing and not slow"]
 
@@ -33,7 +33,7 @@ def main(versions):
         known[version] = run(python_in(ROOT / FOLDER_OF[version]))
         print(version, known[version], flush=True)
         write_whole(RESULTS, json.dumps(known, indent=1) + "\n")
-        put_between(README, COMMAND, shown(known), stamped=False)
+        put_between(PAGE, COMMAND, shown(known), stamped=False)
     return 1 if any(one["failed"] for one in known.values()) else 0
 
 

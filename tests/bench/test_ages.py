@@ -1,4 +1,6 @@
-"""Generated pages say when they were made, and the README says which are older than the code."""
+"""Generated pages say when they were made, and docs/versions.md says which are older than the code."""
+
+from pathlib import Path
 
 import pytest
 
@@ -13,12 +15,12 @@ def test_every_generated_page_says_at_which_commit_it_was_made(page):
 
 
 @pytest.mark.parametrize("page", ages.PAGES)
-def test_the_readme_names_pages_that_are_older_than_the_code(page):
+def test_the_table_names_pages_that_are_older_than_the_code(page):
     if ages.git("rev-parse", "HEAD") is None or ages.git("rev-parse", "--is-shallow-repository") == "true":
         pytest.skip("there is no history here")
     made = ages.oldest(page)
-    lines = ages.README.read_text(encoding="utf-8").splitlines()
-    (row,) = [line for line in lines if f"({page}) | `{ages.PAGES[page]}`" in line]
+    lines = ages.TABLE.read_text(encoding="utf-8").splitlines()
+    (row,) = [line for line in lines if f"({Path(page).name}) | `{ages.PAGES[page]}`" in line]
     assert made.since is not None, f"{made.commit} of {page} is no commit of this history"
     assert made.commit in row, f"run `{ages.COMMAND}`"
     assert ("older" in row) or not made.old, (
