@@ -48,7 +48,7 @@ from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
 from .interfaces import upload_interfaces
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
-from .media import is_endless
+from .media import dimmed, is_endless
 
 FOUND = ("photon_points", "photon_normals", "photon_fluxes")
 EMISSION = Struct(
@@ -185,13 +185,14 @@ class Photons:
         """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next."""
         target = self._target("_found", light.view.side, len(FOUND))
         for block, bound in self._drawn(frame, technique, casters, light, interfaces):
+            textures = {
+                **frame.hierarchy("transmission").textures, **bound["textures"],
+                "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
+            }  # fmt: skip
             passes.fullscreen(
-                PHOTONS,
+                dimmed(frame, PHOTONS, textures),
                 target,
-                textures={
-                    **frame.hierarchy("transmission").textures, **bound["textures"],
-                    "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
-                },
+                textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},
                 constants={"offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index},
             )  # fmt: skip
@@ -206,12 +207,11 @@ class Photons:
         target = self._target("_found", light.view.side, len(FOUND))
         behind = self._behind.farthest(frame, technique, light.view, casters.refracting)
         for block, bound in self._drawn(frame, technique, casters, light, 1):
+            textures = {**bound["textures"], **{name: behind[name] for _, name in BEHIND}, **receivers}
             passes.fullscreen(
-                LOOKUPS,
+                dimmed(frame, LOOKUPS, textures),
                 target,
-                textures={
-                    **bound["textures"], **{name: behind[name] for _, name in BEHIND}, **receivers,
-                },
+                textures=textures,
                 blocks={"film_view": block, "map_view": map_block, **bound["blocks"]},
             )  # fmt: skip
             yield self._bundle(frame, technique, target, light)

@@ -1,6 +1,21 @@
 // What a texel of a light's view stands for, and how wide lobes are; `film_view` is the light's view.
 
-// Flux through a texel at a place that it shows, W: what arrives across the light's direction times the texel's area there.
+#ifdef MEDIA
+#include "media/media.glsl"
+#endif
+
+// What media let pass of light along a stretch of a photon's way: with the same random numbers for all photons of a sample,
+// which are one smooth map.
+vec3 passing_media(vec3 origin, vec3 direction, float limit)
+{
+#ifdef MEDIA
+  return media_transmittance(origin, direction, min(limit, FARTHEST_MEDIUM), hash3(uvec3(uint(film_view.sample_index), 61u, 0u)).x);
+#else
+  return vec3(1.0);
+#endif
+}
+
+// Flux through a texel at a place that it shows, W: what arrives through media across the light's direction times the texel's area there.
 vec3 texel_flux(vec3 position, out vec3 direction, out float away, out float area)
 {
   bool parallel = film_view.eye.w > 0.5;
@@ -15,7 +30,9 @@ vec3 texel_flux(vec3 position, out vec3 direction, out float away, out float are
   }
   vec3 towards;
   float density;
-  return light_sample(light_read(0), position, towards, density) * area;
+  Light light = light_read(0);
+  vec3 arriving = light_sample(light, position, towards, density);
+  return arriving * area * passing_media(position, towards, light_distance(light, position, towards));
 }
 
 // Half width of a lobe of microfacets as a tangent, about its mirrored or bent direction.

@@ -151,6 +151,7 @@ void main()
     float slope = dot(leaving.geometric_normal, onward);
     float t = (abs(slope) > 0.05) ? dot(leaving.geometric_normal, leaving.position - from) / slope : low;
     t = clamp(t, max(low - 0.1 * extent, 0.0), low + 0.1 * extent);
+    flux *= passing_media(from, onward, t);
     from += t * onward;
     travelled += t;
     flux *= exp(-photon_light.absorbed.rgb * t);
@@ -199,6 +200,7 @@ void main()
     return;
   }
   travelled += t;
+  flux *= passing_media(from, onward, t);
   float light_spread = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
   float lobes = photon_light.spread.y * lobe_spread * travelled;
   out_point = vec4(from + t * onward, bends ? 1.0 : 2.0);

@@ -102,6 +102,7 @@ void main()
     }
     position = origin + t * onward;
     travelled += t;
+    flux *= passing_media(origin, onward, t);
     blur_squared += lobe_spread * lobe_spread * t * t;
     vec3 normal = triangle_normal(hit);
     int material = triangle_material(hit);

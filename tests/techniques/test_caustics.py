@@ -11,7 +11,7 @@ from addon.lighting import photons
 from addon.lighting.caustic_casters import grown
 from addon.lighting.light_views import groups
 from tests.techniques.conftest import places
-from tests.techniques.foggy_stage import fill
+from tests.techniques.foggy_stage import absorber, box, fill
 
 PHOTONS, MAPPING = "screen_space_photons", "caustics_mapping"
 SIZE = (128, 128)
@@ -634,3 +634,16 @@ def test_what_lies_in_water_or_glass_is_as_bright_as_in_cycles(written, solid):
     )
     print(f"{own:.6f} beside {cycles:.6f}")
     assert own == pytest.approx(cycles, rel=0.04)
+
+
+def test_fog_dims_photons_before_their_caster_and_after_it(stage, technique_name):
+    """A sheet of glass that bends nothing, 1 m above the floor, in an absorbing box 2 m high."""
+    stage.floor(2.0)
+    stage.rectangle((-1, -1), (1, 1), z=1.0, material=glass(stage, ior=1.0)).visible_camera = False
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(1.0)
+    clear = irradiance(stage, technique_name, samples=1, size=(16, 16)).mean()
+    box(stage, absorber(stage, (0.4, 0.4, 0.4)), (-3, -3, -1), (3, 3, 2))
+    foggy = irradiance(stage, technique_name, samples=1, size=(16, 16)).mean()
+    assert 0.8 < clear < 1.1
+    assert foggy / clear == pytest.approx(np.exp(-0.4 * 2), rel=0.01)
