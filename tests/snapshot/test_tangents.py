@@ -127,3 +127,24 @@ def test_asking_later_gives_tangents_then(stage):
     new = only_mesh(stage.take(cache))
     assert set(new.tangents) == {"uv"}
     assert new.version > old.version
+
+
+def test_triangles_count_by_their_angle_at_the_corner():
+    """Two triangles of 30 and 120 degrees at the vertex they share, whose maps run in other directions."""
+    turn = np.radians([0.0, 30.0, 150.0])
+    positions = np.concatenate([np.zeros((1, 3)), np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1)]).astype(
+        np.float32
+    )
+    corner_vertices = np.array([0, 1, 2, 0, 2, 3], np.int32)
+    triangles = np.arange(6, dtype=np.int32).reshape(2, 3)
+    uv = np.array([(0, 0), (1, 0), (0.9, 0.5), (0, 0), (0.9, 0.5), (0.1, 0.9)], np.float32)
+    directions = []
+    for corners in triangles:
+        edges = positions[corner_vertices[corners]][1:] - positions[0]
+        along = np.linalg.inv(uv[corners][1:]) @ edges  # dP/du, dP/dv
+        directions.append(along[0] / np.linalg.norm(along[0]))
+    expected = 30 * directions[0] + 120 * directions[1]
+    normals = np.tile(np.float32([0, 0, 1]), (6, 1))
+    found = corner_tangents(positions, corner_vertices, normals, uv, triangles)
+    np.testing.assert_allclose(found[0, :3], expected / np.linalg.norm(expected), atol=1e-6)
+    assert abs(np.dot(found[0, :3], sum(directions) / np.linalg.norm(sum(directions)))) < 0.999, "or angles are nothing"

@@ -210,3 +210,23 @@ def test_dark_surroundings_of_a_bright_rim_stay_dark(stage):
     near = np.maximum(np.abs(x), np.abs(y)) < 0.15
     noise = [np.square(one - truth)[near].mean() for one in (denoised, picture(64, 0.0))]
     assert noise[0] < 0.4 * noise[1]
+
+
+def test_the_variance_of_a_level_is_that_of_a_weighted_mean(gpu_context):
+    """Of an even picture all 5x5 weights are the binomial ones, so that sigma^2 falls by the sum of their squares."""
+    size = width, height = 32, 16
+    rows, columns = np.mgrid[0:height, 0:width].astype(np.float32)
+    position = np.stack([(columns - 16) / 16, (rows - 8) / 16, np.zeros_like(rows) - 4, np.ones_like(rows)], axis=-1)
+    normal, light = (np.zeros((height, width, 4), np.float32) + np.float32(one) for one in ((0, 0, 1, 1), (1, 1, 1, 4)))
+    view = View(Camera(np.eye(4), "PERSPECTIVE", (-0.25, 0.25, -0.125, 0.125), 0.1, 100.0), Film(*size, (0, 0, *size)),
+                np.zeros(3))  # fmt: skip
+    with images.borrowed(*size, "RGBA32F") as target:
+        passes.fullscreen(
+            LEVEL, target, blocks={"film_view": Block(VIEW, **view.values(0, 0, (0.0, 0.0), 10.0))},
+            textures={name: images.upload(np.ascontiguousarray(p, np.float32)) for name, p in
+                      {"surface_position": position, "normal_sum": normal, "light_in": light}.items()},
+            constants={"stride": 1, "tolerance": 3.0, "sharpness": 32.0},
+        )  # fmt: skip
+        out = images.read(target.colors[0])[4:-4, 4:-4]
+    np.testing.assert_allclose(out[..., 0], 1.0, rtol=1e-6)
+    np.testing.assert_allclose(out[..., 3], 4.0 * (np.square([1, 4, 6, 4, 1]).sum() / 256) ** 2, rtol=1e-4)

@@ -7,7 +7,7 @@ import pytest
 from addon.compare.metrics import relative_squared_error
 from addon.lighting import linked
 from addon.snapshot import SnapshotCache, take
-from addon.snapshot.linking import MOST_GROUPS
+from addon.snapshot.linking import MOST_GROUPS, LinkTable
 from addon.sources import lights
 
 SIZE = (64, 48)
@@ -167,3 +167,11 @@ def test_more_groups_than_there_are_bits_are_named(room):
 def test_what_is_not_followed_is_said(room):
     lit_alone(room, room.lamp)
     assert any("bounced light follows none" in note.text for note in snapshot_of(room).notes)
+
+
+def test_an_instance_is_linked_as_its_parent_is_before_itself():
+    """A copy follows its instancer where that stands in a collection; else what is said of the object itself."""
+    table = LinkTable(receivers={1: 1, 2: 2}, blockers={1: 3}, others=(0, 0), unlit={9: (2,)}, passing={})
+    assert (table.of(1, 0).receiver, table.of(1, 2).receiver, table.of(1, 7).receiver) == (1, 2, 1)
+    assert table.of(1, 2).blocker == 3, "of blockers the parent says nothing"
+    assert table.of(9, 0).unlit == table.of(1, 9).unlit == (2,)
