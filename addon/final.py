@@ -153,7 +153,7 @@ def _part(order: Order, snapshot: Snapshot, share: Share) -> Generator[Progress 
             except StopIteration as end:
                 frame = end.value
                 break
-        yield Progress(f"Compiling shaders, {done} of {total}")
+        yield Progress(f"Compiling shaders, {done} of {total}") if total else None
     if before is not None and before.size != frame.size:
         with turn:
             images.pool.trim()  # nobody asks for images of the old size again

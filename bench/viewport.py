@@ -104,14 +104,14 @@ class Driver:
 
     def _watch_edits(self) -> None:
         """Note what has been uploaded when a frame has begun, and no sample yet."""
-        begin = self.viewport.renderer.begin
+        beginning = self.viewport.renderer.beginning
 
         def noted(*arguments):
-            frame = begin(*arguments)
+            frame = yield from beginning(*arguments)
             self.begun = self.traffic.bytes
             return frame
 
-        self.viewport.renderer.begin = noted
+        self.viewport.renderer.beginning = noted
 
     def read(self, camera, width, height):
         self.reads += 1

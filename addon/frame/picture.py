@@ -70,6 +70,7 @@ class Frame:
     lamp_maps: LampMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
+    at: str = ""  # label of the technique that is at work, or was last
     film_points: int = 1  # that a sample shows; the surface technique says it before it looks
     samples_done: int = 0
     numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice

@@ -72,7 +72,8 @@ class Renderer:
     def beginning(
         self, snapshot: Snapshot, settings: Settings, numbers: tuple[int, ...] | None = None
     ) -> Generator[tuple[int, int], None, Frame]:
-        """The same in parts: yields (done, total) after each program that had to be compiled; returns the frame."""
+        """The same in parts: yields (0, 0) when geometry and materials are those of the snapshot, then (done, total)
+        after each program that had to be compiled; returns the frame."""
         try:
             frame = yield from self._begin(snapshot, settings)
             frame.numbers = numbers
@@ -96,12 +97,11 @@ class Renderer:
         geometry_changed = self.geometry.update(snapshot, self.materials.compiled)
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
+        yield 0, 0
         environment = self._update_environment(snapshot)
         self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
         plan = make_plan(self.techniques, snapshot, settings)
-        ledger.times["upload"] = watch.working
-        yield from compiling(self._programs(plan, snapshot, settings))
-        ledger.times["compile"] = watch.compiling
+        ledger.times["upload"], ledger.times["compile"] = watch.working, watch.compiling
         ledger.notes = tuple(
             dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes))
         )
@@ -119,6 +119,8 @@ class Renderer:
             self.frame.settings = settings
             self.frame.snapshot = snapshot  # the same but for what only `show` asks for, as the time
             return self.frame
+        yield from compiling(self._programs(plan, snapshot, settings))
+        ledger.times["compile"] = watch.compiling
         self._frame_key = key
         self._drop_frame()
         values = view.values(0, settings.seed, (0.0, 0.0), self.geometry.size)
@@ -412,6 +414,7 @@ def _stage(frame: Frame, stage: str) -> Iterator[None]:
         run = getattr(technique, stage)
         if getattr(run, "__func__", run) is getattr(Technique, stage):
             continue
+        frame.at = technique.label
         with frame.profiler.step(technique.name):
             parts = iter(run(frame) or ())
         for _ in frame.profiler.steps(technique.name, parts):

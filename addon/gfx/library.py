@@ -153,6 +153,7 @@ class Shader:
         self.kept = _Kept(self.handle)
         weakref.finalize(self, _dropped.append, self.kept).atexit = False
         self.used = 0  # the last picture that asked for it
+        self._fresh = True  # never bound: some drivers do most of their work at the first draw
         handle, loaded = self.handle, program.loaded
         # By kind and name, how each is set; one that the driver dropped is not set again.
         self._textures = {
@@ -166,6 +167,9 @@ class Shader:
     def bind(self, textures=None, images=None, blocks=None, constants=None) -> None:
         """Bind the shader and all its resources. Values: gfx Images, gfx Blocks, numbers or arrays."""
         textures, images, blocks, constants = textures or {}, images or {}, blocks or {}, constants or {}
+        if self._fresh:
+            self._fresh = False
+            _count_first_use()
         if len(textures) + len(images) + len(blocks) + len(constants) != self._count:
             self._refuse(textures, images, blocks, constants)
         self.handle.bind()
@@ -239,6 +243,17 @@ _shaders: dict[Program, Shader] = {}
 _dropped: list[_Kept] = []
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
 compile_seconds = 0.0  # what that took
+first_uses = 0  # how many programs were drawn with for the first time
+
+
+def _count_first_use() -> None:
+    global first_uses
+    first_uses += 1
+
+
+def news() -> int:
+    """Grows with each program that is compiled or first drawn with: what either of it took says little of the next."""
+    return compile_count + first_uses
 
 
 def get(program: Program) -> Shader:

@@ -31,6 +31,7 @@ docs/log/2026-11-26-indirect-light.md.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 
@@ -184,8 +185,8 @@ class VirtualLights:
         self._image: images.Image | None = None
         self.kinds = 0  # of the sources, as bits
 
-    def make(self, frame: Frame, technique, count: int) -> VirtualLightSet:
-        """About `count` virtual lights for this sample. Counts rays in the technique's ledger row."""
+    def make(self, frame: Frame, technique, count: int) -> Generator[None, None, VirtualLightSet]:
+        """About `count` virtual lights for this sample, in parts. Counts rays in the technique's ledger row."""
         self.draw_sources(frame)
         grid = Grid.of(frame, count)
         candidates = grid.count * grid.rays
@@ -193,15 +194,20 @@ class VirtualLights:
         found = self._candidates(frame, grid)
         held = [*found.values()]
         try:
+            yield
             order = choice.order(found["candidate_point"], found["candidate_normal"])
+            yield
             pairs = None
             if frame.settings.bounces > 1 and not frame.settings.draft:
                 pairs = self._pairs(frame, grid, found, order)
                 held.append(pairs)
+                yield
             radiances = choice.radiances(found, pairs, frame.service(MediaService))
             slots, kept_before = choice.keep(count, frame.random("virtual lights/keep")[0])
+            yield
             densities = self._densities(frame, grid, found, slots)
             held.append(densities)
+            yield
             self._make_image(frame, grid, {**found, "slots": slots, "radiances": radiances, "densities": densities})
             frame.count_texel(technique, "virtual lights", kept_before, at=choice.last)
             frame.count_texel(technique, "density rays", kept_before, grid.count, at=choice.last)

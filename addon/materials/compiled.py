@@ -84,6 +84,7 @@ class CompiledMaterial:
     along_normal: bool = False  # by a height: what it lifts, it lifts along the normal
     averaging: frozenset[str] = frozenset()  # those of `images` of which some lookup averages (averages.py)
     own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
+    color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # about what it reflects, on average: for first looks
 
     @property
     def bounds_alone(self) -> bool:

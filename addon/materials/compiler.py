@@ -59,6 +59,7 @@ class _Compilation:
         self.code.fallbacks.update(dict.fromkeys(tuple(note) for note in notes))
         self.bounds = Bounds(self.code)
         self._leaves: dict[tuple[str, str], Summary] = {}
+        self._color, self._reflecting = np.zeros(3), 0.0  # of the leaves that reflect: colours by weight, weights
 
     def result(self) -> CompiledMaterial:
         self._displacement()
@@ -104,6 +105,7 @@ class _Compilation:
             displaces=code.exists(self.graph.displacement),
             along_normal=self._lifts_along_normal(),
             averaging=frozenset(code.averaging),
+            color=tuple(np.clip(np.nan_to_num(self._color / max(self._reflecting, 1e-6)), 0.0, 1.0).tolist()),
         )
 
     def _unused_slots(self, medium: Medium | None, glass: bool) -> None:
@@ -187,6 +189,7 @@ class _Compilation:
                 self._combine(node, entry, weight, estimate, weights)
             else:
                 self._leaves[link] = self._leaf(node, entry, weight)
+                self._add_color(node, entry, float(np.clip(estimate.mean.mean(), 0.0, 1.0)))
                 total += self._leaves[link].weighted(estimate)
         return total
 
@@ -262,6 +265,16 @@ class _Compilation:
         self.code.lines.extend((f"if ({weight} > 0.0) {{", f"  {entry.function}({call});", "}"))
         self.code.describe(node, entry)
         return entry.summary(self.bounds.sockets(node, entry))
+
+    def _add_color(self, node: Node, entry: Entry, weight: float) -> None:
+        """Count the mean colour of a leaf of this mean weight, if it reflects."""
+        if node.type == "ShaderNodeBsdfTransparent" or ("Bsdf" not in node.type and node.type not in REFLECTING):
+            return
+        named = {argument.identifier for argument in entry.arguments if isinstance(argument, Socket)}
+        name = next((name for name in ("Base Color", "Color") if name in named), None)
+        color = self.bounds.sockets(node, entry)[name].mean if name else np.full(3, 0.8)
+        self._color += weight * color
+        self._reflecting += weight
 
     def _implicit_emission(self, node: Node, link: tuple[str, str], weight: str) -> Summary:
         """A colour or number where a shader belongs."""

@@ -33,6 +33,7 @@ its mean reflectance instead.
 from __future__ import annotations
 
 import weakref
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -326,22 +327,49 @@ class Hits:
         self._number(frame)
         return self._numbers[instance.mesh, frame.geometry.placed[1][instance.mesh].version, instance.materials]
 
-    def shade(
+    def shade(self, *arguments, **named) -> None:
+        """`shading` at once."""
+        for _ in self.shading(*arguments, **named):
+            pass
+
+    def shading(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
         closures: images.Target, number: int = 0, masked: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> Iterator[None]:  # fmt: skip
         """Evaluate these materials at the records into `closures` (take_closures), which is cleared before; `masked`:
-        of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0."""
+        of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0. In
+        parts: after each program that draws for the first time, which takes the driver long."""
         images.Target(closures.colors[:1] if masked else closures.colors).clear()
+        leaders = {frame.materials.leaders[k] for k in materials}
+        # One program after the other: between materials that share one, only what differs is bound.
+        order = sorted(leaders, key=lambda k: (_program_key(frame.materials.compiled[k]), k))
+        fresh = [k for k in order if _program_key(frame.materials.compiled[k]) not in self._compiled]
+        for material in fresh:
+            self._draw(frame, ray_direction, records, [material], closures, number)
+            yield
+        self._draw(frame, ray_direction, records, [k for k in order if k not in fresh], closures, number)
+        if self._flagged:
+            with images.borrowed(1, 1, "R32F") as count:
+                number_of_all = {"material_count": len(frame.materials.compiled)}
+                passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
+                frame.count_texel(technique, "materials", count.colors[0])
+        frame.count(technique, "programs", len(leaders))
+        frame.count(technique, "passes", len(leaders) + 1)
+
+    def _draw(
+        self, frame: Frame, ray_direction: images.Image, records: Records, order: list[int], closures: images.Target,
+        number: int,
+    ) -> None:  # fmt: skip
+        """Evaluate materials, by their leaders, in this order."""
+        if not order:
+            return
         found = records.images
         shared = {f"hit_{name}": found[f"hit_{name}"] for name in RECORDS[:3]}
         shared |= {"ray_direction": ray_direction, "instances": frame.geometry.instances}
         lists = {"hit_material": found["hit_material"], "hit_materials": self._absorption_of(frame)}
         view, shader = {"film_view": frame.view_block}, None
-        leaders = {frame.materials.leaders[k] for k in materials}
         with passes.drawing(closures, depth_test="EQUAL", depth_write=False):
-            # One program after the other: between materials that share one, only what differs is bound.
-            for material in sorted(leaders, key=lambda k: (_program_key(frame.materials.compiled[k]), k)):
+            for material in order:
                 program, own = self._own_bindings(frame, material, number)
                 if program.textures and ("UINT_2D", "materials_met") in program.textures:
                     own["textures"]["materials_met"] = records.met
@@ -356,13 +384,6 @@ class Hits:
                     shader.bind(textures=textures, blocks=blocks, constants=own["constants"])
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))
-        if self._flagged:
-            with images.borrowed(1, 1, "R32F") as count:
-                number_of_all = {"material_count": len(frame.materials.compiled)}
-                passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
-                frame.count_texel(technique, "materials", count.colors[0])
-        frame.count(technique, "programs", len(leaders))
-        frame.count(technique, "passes", len(leaders) + 1)
 
     def _own_bindings(self, frame: Frame, material: int, number: int) -> tuple[Program, dict]:
         """The program of a material, and what it binds besides records, rays, instances and the view."""

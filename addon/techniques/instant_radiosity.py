@@ -203,7 +203,7 @@ class InstantRadiosity(Technique):
     def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
-        lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
+        lights = yield from self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
         bindings["constants"]["rays"] = self._rays(frame)
         bindings["constants"] |= self._reach(frame, -(-lights.wanted // SUBSETS))

@@ -193,7 +193,7 @@ class MultiresRadiosity(InstantRadiosity):
         levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
         scale = frame.typical_distance
-        lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
+        lights = yield from self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
         if not frame.settings.get(self, "near_bounces"):
             bindings["constants"]["deeper"] = 0.0

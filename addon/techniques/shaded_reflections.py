@@ -246,15 +246,18 @@ class ShadedReflections(Technique):
                 round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
                 met = hits.trace(frame, self, rays.colors[:2], records, number=number)
                 yield
-                hits.shade(frame, self, rays.colors[1], records, met, closures, number, masked=True)
+                yield from hits.shading(frame, self, rays.colors[1], records, met, closures, number, masked=True)
                 yield
                 self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
                 self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
                 if not met:
                     break
+                yield
                 self._add_guide(frame, rays, records, closures, round_)
+                yield
                 self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
                 if caustics:
+                    yield
                     self._add_caustics(frame, caustics, rays, records, closures, transmission)
                 yield
                 if number + 1 < rounds:

@@ -109,7 +109,7 @@ def _begun(renderer: Renderer, snapshot, settings: Settings) -> Iterator[tuple[f
                 done, total = next(parts)
             except StopIteration as end:
                 return end.value
-        yield 0.0, f"compiling shaders, {done} of {total}"
+        yield 0.0, f"compiling shaders, {done} of {total}" if total else "reading the scene"
 
 
 def reference_images(reference: Reference) -> dict[str, np.ndarray]:

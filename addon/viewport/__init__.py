@@ -1,0 +1,214 @@
+"""The viewport: each 3D region's picture, coarse while it changes, refined sample by sample while it rests.
+
+Blender calls `view_update` in the middle of its dependency-graph evaluation, where nothing may be drawn: `changed`
+only records. All work is done by `draw`, which Blender calls whenever the region is drawn. One call works for a short
+time, shows what there is and asks to be called again until the picture is complete, so that Blender keeps answering.
+While the view moves a call draws a whole sample: a draft, in pixels coarse enough for that. At rest a sample in full
+resolution takes as many calls as it needs, technique by technique and long passes in bands (frame/bands.py), and the
+last whole one stays in view.
+
+Engine instances come and go with the shading mode and with each frame of an animation. What they share lives in
+`_viewports`, one `Viewport` for each region and scene, and is freed a moment after the last instance has gone: not by
+the instance's end itself, which may come where no GPU context is, but by a timer of Blender's main loop.
+"""
+
+from __future__ import annotations
+
+import traceback
+
+import bpy
+import gpu
+import numpy as np
+
+from ..gfx import context as gpu_context
+from ..gfx import images
+from ..gfx.context import turn
+from ..snapshot import UnsupportedScene, camera_of_scene, camera_of_view, take
+from ..snapshot.errors import unforeseen
+from ..snapshot.scene import Camera, Snapshot
+from ..ui.properties import settings_of
+from .pace import SCALES, STEP_S, Pace
+from .picture import BUDGET_S, MOST_BUDGET_S, REST_S, Viewport
+
+__all__ = ["BUDGET_S", "MOST_BUDGET_S", "REST_S", "SCALES", "STEP_S", "Pace", "Viewport", "changed", "draw", "free_all"]
+
+FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
+
+TURN_WAIT_S = 0.1  # for the GPU, while a final render draws a part of a sample
+
+# -------------------------------------------------------------------------------------------------- Blender's callbacks
+
+_viewports: dict[tuple[int, int], Viewport] = {}  # by address of the region and session_uid of the scene
+
+
+def _viewport_of(engine, context, depsgraph) -> Viewport:
+    key = (context.region.as_pointer(), depsgraph.scene.original.session_uid)
+    viewport = _viewports.get(key)
+    if viewport is None:
+        viewport = _viewports[key] = Viewport()
+    if viewport.owner() is not engine:
+        viewport.attach(engine, _free_soon)
+    return viewport
+
+
+def changed(engine, context, depsgraph) -> None:
+    """The scene may have changed: remember what Blender says about it. Draws nothing, allocates nothing."""
+    viewport = _viewport_of(engine, context, depsgraph)
+    viewport.dirty = True
+    viewport.error = ""
+    if viewport.frame is not None:
+        viewport.cache.invalidate(depsgraph.updates)
+    engine.tag_redraw()  # Blender draws again after an artist's change, not after one by a script
+
+
+def draw(engine, context, depsgraph) -> None:
+    """Draw the region: add samples, show the picture, and ask for another call until it is complete."""
+    viewport = _viewport_of(engine, context, depsgraph)
+    region, scene = context.region, depsgraph.scene
+    size = (max(region.width, 1), max(region.height, 1))
+    place = (size, context.region_data.view_perspective)
+    if viewport.error and viewport.failed_at != place:  # it may have been this view's, or this size's
+        viewport.error = ""
+    if not viewport.error:
+        viewport.failed_at = place
+        paused = viewport.paused = scene.candela.viewport_pause and viewport.picture is not None
+        if paused:
+            pass
+        elif turn.acquire(timeout=TURN_WAIT_S):
+            try:
+                with images.lasting_context():
+                    _refine(viewport, engine, context, depsgraph, size)
+            finally:
+                turn.release()
+        else:
+            engine.tag_redraw()  # a final render draws
+    if viewport.picture is not None:
+        _show(engine, scene, viewport)
+    engine.update_stats("Candela", viewport.status())
+    if not viewport.done:
+        engine.tag_redraw()
+    elif viewport.news:
+        viewport.news = False
+        for area in context.screen.areas:
+            if area.type == "PROPERTIES":
+                area.tag_redraw()  # the Frame panel shows this picture's ledger
+
+
+def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int]) -> None:
+    space, region_data = context.space_data, context.region_data
+    looks_through = None
+    if region_data.view_perspective == "CAMERA":
+        looks_through = space.camera if space.use_local_camera else depsgraph.scene.camera
+        if looks_through is not None and looks_through.type != "CAMERA":
+            looks_through = None
+    hidden, shown = _hidden(space), None
+    if hidden:
+        shown = lambda shown_object: shown_object.visible_in_viewport_get(space)  # noqa: E731
+    if viewport.hidden != hidden:
+        viewport.hidden = hidden
+        viewport.dirty = True
+
+    def source(camera: Camera, width: int, height: int) -> Snapshot:
+        return take(depsgraph, viewport.cache, width, height, view=camera, shown=shown)
+
+    blend, depth_test, depth_mask = gpu.state.blend_get(), gpu.state.depth_test_get(), gpu.state.depth_mask_get()
+    try:
+        camera = camera_of_view(region_data, space, looks_through)
+        border = render_border(depsgraph, space, camera, looks_through, size)
+        viewport.draw_frame(
+            source, camera, size, settings_of(depsgraph.scene, viewport=True, depsgraph=depsgraph), border=border
+        )
+    except (UnsupportedScene, ValueError, RuntimeError) as error:
+        _fail(viewport, engine, str(error))
+    except Exception as error:
+        # An error of Candela's own. Raised further it would come again with every redraw.
+        traceback.print_exc()
+        _fail(viewport, engine, unforeseen(error))
+    finally:
+        gpu.state.blend_set(blend)
+        gpu.state.depth_test_set(depth_test)
+        gpu.state.depth_mask_set(depth_mask)
+
+
+_KINDS = [p.identifier for p in bpy.types.SpaceView3D.bl_rna.properties if p.identifier.startswith("show_object_view")]
+
+
+def _hidden(space) -> tuple[str, ...]:
+    """Names of what the region's own settings hide: other than in local view or in its collections, and kinds."""
+    own = [name for name in ("local_view", "use_local_collections") if getattr(space, name, None)]
+    kinds = [name for name in _KINDS if not getattr(space, name, True)]
+    return (*own, *kinds)
+
+
+def render_border(depsgraph, space, view: Camera, looks_through, size: tuple[int, int]):
+    """Pixels (x0, y0, x1, y1) of the region that its render border leaves to be drawn; None without one."""
+    render = depsgraph.scene_eval.render
+    if looks_through is not None and render.use_border:
+        # Both frames lie one unit before the same eye, so they can be compared.
+        resolution = render.resolution_x, render.resolution_y
+        left, right, bottom, top = camera_of_scene(depsgraph.scene_eval, depsgraph, *resolution, looks_through).frame
+        low = left + (right - left) * render.border_min_x, bottom + (top - bottom) * render.border_min_y
+        high = left + (right - left) * render.border_max_x, bottom + (top - bottom) * render.border_max_y
+        left, right, bottom, top = view.frame
+        scale, start = np.array([right - left, top - bottom]), np.array([left, bottom])
+        shares = (*((np.array(low) - start) / scale), *((np.array(high) - start) / scale))
+    elif looks_through is None and space.use_render_border:
+        shares = (
+            space.render_border_min_x, space.render_border_min_y, space.render_border_max_x, space.render_border_max_y,
+        )  # fmt: skip
+    else:
+        return None
+    edges = np.clip(np.round(np.array(shares) * (*size, *size)), 0, (*size, *size)).astype(int)
+    x0, y0 = np.minimum(edges[:2], np.array(size) - 1)
+    return int(x0), int(y0), int(max(edges[2], x0 + 1)), int(max(edges[3], y0 + 1))
+
+
+def _fail(viewport: Viewport, engine, sentence: str) -> None:
+    """Stop drawing until the scene changes; the sentence stands in the region, and once in Blender's reports."""
+    viewport.drop()
+    if viewport.reported != sentence:
+        engine.report({"ERROR"}, sentence)
+    viewport.error = viewport.reported = sentence
+
+
+def _show(engine, scene, viewport: Viewport) -> None:
+    """Draw the picture over the region, with the scene's colour management."""
+    from gpu_extras.presets import draw_texture_2d
+
+    x, y, width, height = viewport.place
+    gpu.state.blend_set("ALPHA_PREMULT")
+    engine.bind_display_space_shader(scene)
+    draw_texture_2d(viewport.picture.texture, (x, y), width, height)
+    engine.unbind_display_space_shader()
+    gpu.shader.unbind()
+    gpu.state.blend_set("NONE")
+
+
+def _free_soon() -> None:
+    if not bpy.app.timers.is_registered(_free_orphans):
+        bpy.app.timers.register(_free_orphans, first_interval=FREE_AFTER_S)
+
+
+def _free_orphans() -> float | None:
+    """Free the viewports that no engine instance draws any more; runs in Blender's main loop."""
+    orphans = [key for key, viewport in _viewports.items() if viewport.owner() is None]
+    if not orphans:
+        return None
+    if not gpu_context.available() or not turn.acquire(timeout=0.0):
+        return FREE_AFTER_S  # later
+    try:
+        for key in orphans:
+            _viewports.pop(key).release()
+        images.pool.trim()
+    finally:
+        turn.release()
+    return None
+
+
+def free_all() -> None:
+    """Free every viewport; those that are still open begin anew with their next redraw."""
+    for viewport in _viewports.values():
+        viewport.release()
+    _viewports.clear()
+    if bpy.app.timers.is_registered(_free_orphans):
+        bpy.app.timers.unregister(_free_orphans)

@@ -1,0 +1,57 @@
+"""How coarse pixels are while a picture changes, so that it keeps its rate, and how one at rest gets finer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+STEP_S = 0.08  # what a step may take while the picture changes, to stay below 0.1 s: coarser pixels are drawn for it
+SCALES = (1, 2, 4, 8, 16)  # screen pixels per side of a drawn pixel; all but the first are drafts
+LONG_S = 1.5  # a sample in full resolution that takes no longer is waited for without finer drafts before it
+SHORT_S = 0.2  # of drafts that take no longer only the finest is drawn
+
+
+@dataclass
+class Pace:
+    """Which scale keeps a step below its time, learned from what steps took."""
+
+    cost: dict[int, float] = field(default_factory=dict)  # seconds of a sample, by scale
+
+    def learn(self, scale: int, seconds: float) -> None:
+        """Take note of a sample's time; single slow ones count less than lasting ones."""
+        known = self.cost.get(scale, seconds)
+        self.cost[scale] = 0.5 * (known + seconds)
+
+    def expected(self, scale: int) -> float | None:
+        """Seconds of a sample: measured, and never more than a finer one took. None if nothing is known yet.
+
+        Drafts do less for a pixel than full resolution, so they tell nothing about it.
+        """
+        guesses = [self.cost[finer] for finer in SCALES if finer <= scale and finer in self.cost]
+        if scale > 1 and scale not in self.cost:
+            guesses += [seconds / (scale / other) ** 2 for other, seconds in self.cost.items()]
+        return min(guesses, default=None)
+
+    def scale(self, before: float = 0.0, step: float = STEP_S, coarsest: int = SCALES[-1]) -> int:
+        """The finest scale that is fast enough for a step when `before` seconds of it are spent already, but never more
+        than the coarsest allowed; for a scene never drawn the last but one."""
+        if not self.cost:
+            return min(SCALES[-2], coarsest)
+        left = step - before
+        fitting = (scale for scale in SCALES if (self.expected(scale) or np.inf) <= left)
+        return min(next(fitting, SCALES[-1]), coarsest)
+
+    def finer(self, scale: int) -> int:
+        """The scale that a picture at rest is drawn in after this one."""
+        whole = self.expected(1)
+        if whole is not None and whole <= LONG_S:
+            return 1
+        finer = [one for one in SCALES if 1 < one < scale]
+        quick = (one for one in finer if (self.expected(one) or np.inf) <= SHORT_S)
+        return next(quick, max(finer, default=1))
+
+
+def coarsest_for(height: float, least: int = 64) -> int:
+    """The coarsest scale that leaves a height in pixels at least so many drawn ones."""
+    return max((scale for scale in SCALES if height / scale >= least), default=1)

@@ -1,0 +1,373 @@
+"""What one 3D region shows: coarse while the scene or the view changes, refined while it rests, and always something.
+
+Each call of `draw_frame` works for a short time. A picture is begun in parts, too: programs that it needs are compiled
+one a call. Until the first draft is there the region shows a first look (surfaces/first_look.py), whose programs are
+small and always the same; if the view is the same as before an edit, what was shown stays.
+"""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
+from math import ceil, floor
+
+from .. import techniques
+from ..frame.bands import Bands
+from ..frame.picture import Frame
+from ..frame.run import Renderer
+from ..frame.settings import Settings
+from ..gfx import images, library, passes
+from ..scene.view import View
+from ..snapshot import SnapshotCache
+from ..snapshot.scene import Camera, Snapshot
+from ..surfaces.first_look import FirstLook
+from ..techniques.film import check_tree
+from .pace import SCALES, STEP_S, Pace
+
+BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
+MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
+REST_S = 0.25  # without a change for so long, or for two redraws, the picture is drawn in finer pixels
+
+CHECKS, MOVES, CLIMBS = "checks", "moves", "climbs"  # why a frame is begun
+
+
+@dataclass
+class Beginning:
+    """A frame that is being begun."""
+
+    parts: Generator[tuple[int, int], None, Frame]
+    camera: Camera
+    size: tuple[int, int]
+    border: tuple[int, int, int, int]
+    scale: int
+    why: str  # CHECKS: whether anything drawn has changed; MOVES: it has; CLIMBS: the same in finer pixels
+    samples: int
+    reading: float = 0.0  # seconds that the scene took to be read
+    seconds: float = 0.0
+    placed: bool = False  # geometry and materials are there
+    left: int = 0  # programs that it still has to compile, as far as known
+
+
+class Viewport:
+    """What one region shows of one scene: its own samples, and the scene's content as it was read last."""
+
+    def __init__(self):
+        self.renderer = Renderer(techniques.make_registry)
+        self.cache = SnapshotCache()
+        self.pace = Pace()
+        self.bands = Bands()
+        self.look = FirstLook()
+        self.dirty = True  # the scene may have changed since the snapshot
+        self.frame: Frame | None = None
+        self.scale = SCALES[-2]
+        self.step, self.coarsest = STEP_S, SCALES[-1]  # what a step of a moving view may take; the coarsest pixels
+        self.seconds = 0.0  # spent on the samples of this picture
+        self.error = ""
+        self.owner: Callable = lambda: None  # weak reference to the engine instance that draws it
+        self.paused = False  # the artist wants no more samples for now
+        self.hidden: tuple = ()  # what the region's own settings hide
+        self.news = False  # a ledger that the panels do not show yet
+        self.reported = ""  # the error that was reported last
+        self.failed_at: tuple | None = None  # the region's size and kind of view when the error came
+        self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
+        self.looks = False  # what is shown is a first look
+        self._snapshot: Snapshot | None = None
+        self._asked: tuple | None = None
+        self._size = (0, 0)  # of the region when the frame was begun
+        self._changed_at = 0.0
+        self._finished = False
+        self._beginning: Beginning | None = None
+        self._target: images.Target | None = None  # the picture, apart from the frame's images, which come and go
+        self._shown_with: tuple = ()  # what the picture was shown with, see Frame.shown_with
+        self._shown_place: tuple = ()  # from where, and in which pixels
+        self._begun_for: tuple = ()  # the same of the frame
+        self._look_of: tuple = ()  # of what the first look is
+        self._waits = False  # what is shown is this view of this scene, only coarser
+        self._sample: Iterator | None = None  # what is left of a sample that was begun
+        self._sample_seconds = self._begun_s = 0.0  # `_begun_s`: what the frame took before its first sample
+        self._pauses = (0.0, 0.0)  # between the last redraws
+        self._left_at: float | None = None  # when the last redraw ended, if it left something to be done
+        self._news = -1  # of the library, when the sample was begun
+        self._compiled = 0  # programs since the last whole sample
+
+    @property
+    def picture(self) -> images.Image | None:
+        """What the region shows: the last whole sample and those before it, or a first look; None before the first."""
+        if self.looks:
+            return self.look.picture
+        return self._target.colors[0] if self._target else None
+
+    @property
+    def done(self) -> bool:
+        """Nothing is left to be drawn until something changes."""
+        return bool(self.error) or (self._finished and self._beginning is None) or self.paused
+
+    def status(self) -> str:
+        """How far the picture is, for the text in the region's corner."""
+        if self.error:
+            return self.error
+        if self.paused and self.frame is not None:
+            return f"Paused after sample {self.frame.samples_done} of {self.frame.settings.samples}"
+        if self._beginning is not None:
+            left = self._beginning.left
+            return f"Compiling shaders ({left} remaining)" if left else "Reading the scene"
+        if self.frame is None:
+            return "Waiting for the GPU"
+        coarse = f", 1/{self.scale} resolution" if self.scale > 1 else ""
+        done, of = self.frame.samples_done, self.frame.settings.samples
+        if done == 0 and self._compiled:
+            return f"Compiling shaders for {self.frame.at} ({self._compiled} so far){coarse}"
+        at = f", {self.frame.at}" if done == 0 and self.frame.at else ""
+        return f"Sample {done} of {of}, {self.seconds:.1f} s{coarse}{at}"
+
+    def attach(self, engine, orphaned: Callable[[], None]) -> None:
+        """A new engine instance draws this from now on. What happened before it came is unknown: read all graphs."""
+        self.owner = weakref.ref(engine)
+        self.cache.doubt()
+        self.dirty = True
+        weakref.finalize(engine, orphaned).atexit = False
+
+    def draw_frame(
+        self,
+        source: Callable[[Camera, int, int], Snapshot],
+        camera: Camera,
+        size: tuple[int, int],
+        settings: Settings,
+        clock: Callable[[], float] = time.perf_counter,
+        border: tuple[int, int, int, int] | None = None,
+    ) -> images.Image | None:
+        """Work on the picture of `camera` for BUDGET_S and return it: scene-linear, premultiplied. None: not yet one.
+
+        The picture may be coarser than `size` while the view or the scene changes. `source(camera, width, height)`
+        reads the scene and is asked only when it may have changed. `border`: pixels (x0, y0, x1, y1) that are drawn,
+        by default all. Whatever the renderer raises goes through.
+        """
+        elsewhere = clock() - self._left_at if self._left_at is not None else 0.0
+        self._pauses = self._pauses[1], elsewhere
+        called, known = clock(), library.news()
+        border = border or (0, 0, *size)
+        self._prepare(source, camera, size, border, settings, clock)
+        budget = BUDGET_S
+        while self._begun(settings, clock, called, known):
+            frame, started = self.frame, clock()
+            if self._target is None and self._sample is None and frame.samples_done:
+                self._resolve(frame)  # the frame outlived an error that took its picture
+            elif self._sample is None and frame.samples_done and frame.shown_with != self._shown_with:
+                self._resolve(frame)  # the same samples, at another time or with other settings of a `show` stage
+            budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
+            spent = self._draw_samples(frame, settings, clock, called, known, budget)
+            self.seconds += clock() - started
+            if clock() - called + spent > budget or not self._climbs(camera, size, border, settings, clock):
+                break
+        self._show_something(camera, size, border)
+        self._left_at = None if self.done else clock()
+        frame = self.frame
+        whole = self._beginning is None and self.scale == 1 and frame.samples_done >= settings.samples
+        if whole and not self._finished:
+            self._finished = True
+            self.renderer.finish(frame, ())  # publishes the ledger
+            frame.ledger.times["total"] = self.seconds
+            self._drop_look()
+            images.pool.trim()  # what only moving views needed
+            self.news = True
+        return self.picture
+
+    def _draw_samples(self, frame: Frame, settings: Settings, clock, called: float, known: int, budget: float) -> float:
+        """Draw parts of samples until the budget is spent; seconds of the last one. Only a picture of this very view
+        and scene may wait for its next sample, but a new program is reason enough to let Blender answer."""
+        spent = 0.0
+        while frame.samples_done < settings.samples:
+            spent = self._work(frame, clock, budget)
+            if self._sample is None:
+                self._resolve(frame)  # now: the next sample, once it has begun, changes the images that are shown
+            fresh = library.news() != known
+            if (self._waits or frame.samples_done or fresh) and clock() - called + spent > budget:
+                break
+            if self._waits and self.scale > 1 and frame.samples_done:
+                break  # the next finer one says more than another sample of this one
+        return spent
+
+    def _work(self, frame: Frame, clock, budget: float) -> float:
+        """One part of a sample; the seconds that it took. `_sample` is None afterwards if the sample is whole."""
+        if self._sample is None:
+            self._sample, self._sample_seconds = self.renderer.steps(frame), self._begun_s
+            self._begun_s = 0.0
+            self._news = library.news()
+        before, end, compiled = clock(), object(), library.compile_count
+        whole = next(self._sample, end) is end
+        if whole and not frame.profiler.wait:
+            images.finish()
+        spent = clock() - before
+        self.bands.learn(spent, budget / 2)
+        self._sample_seconds += spent
+        self._compiled += library.compile_count - compiled
+        if whole:
+            self._sample = None
+            self._compiled = 0
+            if library.news() == self._news:  # the first draw of a new program takes the driver's time
+                self.pace.learn(self.scale, self._sample_seconds)
+        return spent
+
+    def _resolve(self, frame: Frame) -> None:
+        """Take the mean of the frame's samples for the picture."""
+        if self._target is None or self._target.size != frame.size:
+            self._drop_picture()
+            self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
+        passes.copy(self.renderer.show(frame), self._target)
+        self._shown_with, self.looks = frame.shown_with, False
+        film = frame.snapshot.film
+        x, y = self._size[0] / film.width, self._size[1] / film.height
+        x0, y0, x1, y1 = film.border
+        self.place = x0 * x, y0 * y, (x1 - x0) * x, (y1 - y0) * y
+        self._shown_place = self._begun_for
+
+    def _show_something(self, camera: Camera, size, border) -> None:
+        """If the picture of this view is still to come, and what is shown is of another one: a first look at it."""
+        pending = self._beginning is not None or not (self.frame.samples_done or self._waits)
+        place = _view_key(camera), size, border
+        if not pending or (self._target is not None and self._shown_place == place and not self.looks):
+            return
+        if self._beginning is not None and not self._beginning.placed:
+            return
+        made = (*place, self.renderer.geometry.changes, id(self._snapshot))
+        if made != self._look_of:
+            film = replace(self._snapshot.film, width=size[0], height=size[1], border=border)
+            view = View(camera, film, self.renderer.geometry.origin)
+            self.look.draw(self._snapshot, self.renderer.geometry, self.renderer.materials.compiled, view)
+            self._look_of = made
+        x0, y0, x1, y1 = border
+        self.place, self.looks = (x0, y0, x1 - x0, y1 - y0), True
+
+    def drop(self) -> None:
+        """Forget the picture and read the scene anew when it is next drawn."""
+        self._drop_picture()
+        self._drop_look()
+        self._sample = self._beginning = None
+        self.dirty = True
+
+    def _drop_look(self) -> None:
+        self.look.release()
+        self._look_of, self.looks = (), False
+
+    def _drop_picture(self) -> None:
+        if self._target is not None:
+            images.pool.give(self._target.colors[0])
+            self._target = None
+
+    def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
+        """Begin what is asked, at a fitting scale, if the frame is not of it."""
+        asked = (
+            _view_key(camera),
+            size,
+            border,
+            replace(settings, samples=0, values=self.renderer.drawn_with(settings)),
+        )
+        view = camera, size, border, settings
+        moved, reading = asked != self._asked, 0.0
+        if self.dirty:
+            started = clock()
+            self._snapshot = source(camera, *size)
+            self.dirty, reading = False, clock() - started
+        elif not moved:
+            begun = self._beginning
+            if settings.samples != (begun.samples if begun else self.frame.settings.samples):
+                self._begin(CHECKS, self.scale, *view)  # more or less of the same picture
+            else:
+                self._climbs(*view, clock)
+            return
+        if moved:
+            self._asked = asked
+            self._changed_at = clock()
+            self._begin(MOVES, self.pace.scale(reading, self.step, self.coarsest), *view, reading)
+        else:  # most updates change nothing that is drawn: selections, names, other scenes' settings
+            self._begin(CHECKS, self.scale, *view, reading)
+
+    def _climbs(self, camera: Camera, size, border, settings: Settings, clock) -> bool:
+        """Begin the same picture in finer pixels, if it rests; whether it does."""
+        if self.scale == 1 or self._beginning is not None or not self.frame.samples_done or self._sample is not None:
+            return False
+        if clock() - self._changed_at <= max(REST_S, 2.0 * min(self._pauses)):
+            return False
+        self._begin(CLIMBS, self.pace.finer(self.scale), camera, size, border, settings)
+        return True
+
+    def _begin(
+        self, why: str, scale: int, camera: Camera, size, border, settings: Settings, reading: float = 0.0
+    ) -> None:
+        check_tree(settings.passes)
+        self._beginning = None
+        width, height = (max(-(-extent // scale), 1) for extent in size)
+        x, y = width / size[0], height / size[1]
+        scaled = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
+        film = replace(self._snapshot.film, width=width, height=height, border=scaled)
+        # A part is done when the GPU has done it; a draft of a moving view is drawn as one, whose passes need not wait
+        # for each other.
+        drawn = replace(settings, profile=scale == 1 or why == CLIMBS, shows=frozenset())
+        if scale > 1:
+            drawn = drawn.as_draft()
+        parts = self.renderer.beginning(replace(self._snapshot, camera=camera, film=film), drawn)
+        self._beginning = Beginning(parts, camera, size, border, scale, why, settings.samples, reading)
+
+    def _begun(self, settings: Settings, clock, called: float, known: int) -> bool:
+        """Go on with the frame that is begun, if there is one; whether there is time to draw it."""
+        while self._beginning is not None:
+            begun, before = self._beginning, clock()
+            try:
+                done, total = next(begun.parts)
+            except StopIteration as end:
+                self._beginning = None
+                begun.seconds += clock() - before
+                self._adopt(end.value, begun, settings, clock)
+                continue
+            except BaseException:
+                self._beginning = None
+                raise
+            begun.seconds += clock() - before
+            begun.placed, begun.left = True, total - done
+            if begun.why == CHECKS and total:  # no picture that stays as it is compiles anything
+                self._changed(begun, settings, clock)
+            if library.news() != known and clock() - called > BUDGET_S:
+                return False
+        return library.news() == known or clock() - called <= BUDGET_S
+
+    def _changed(self, begun: Beginning, settings: Settings, clock) -> None:
+        """What is drawn has changed: begin it at a scale for that, unless that is what is begun."""
+        self._changed_at = clock()
+        scale = self.pace.scale(begun.reading, self.step, self.coarsest)
+        if scale == begun.scale:
+            begun.why = MOVES
+            return
+        left = begun.left
+        self._begin(MOVES, scale, begun.camera, begun.size, begun.border, settings, begun.reading)
+        self._beginning.placed, self._beginning.left = True, left
+
+    def _adopt(self, frame: Frame, begun: Beginning, settings: Settings, clock) -> None:
+        """Take the frame that is begun for the one that is drawn."""
+        frame.shared_out = self.bands if begun.scale == 1 or begun.why == CLIMBS else None
+        if frame is self.frame:
+            if frame.samples_done < settings.samples:
+                self._finished = False
+            return
+        if begun.size != self._size:
+            images.pool.trim()  # nobody will ask for the images of the old size again
+        self.frame, self.scale, self._size = frame, begun.scale, begun.size
+        self.seconds, self._finished, self._sample, self._compiled = 0.0, False, None, 0
+        self._begun_s, self._begun_for = begun.seconds, (_view_key(begun.camera), begun.size, begun.border)
+        self._waits = begun.why == CLIMBS
+        if begun.why == CHECKS:
+            self._changed(begun, settings, clock)
+
+    def release(self) -> None:
+        """Free everything on the GPU and all that was read of the scene; this viewport is not used again."""
+        self._beginning = None
+        self.renderer.release()
+        self.cache.clear()
+        self._drop_picture()
+        self._drop_look()
+        self.frame = self._sample = self._snapshot = None
+
+
+def _view_key(camera: Camera) -> tuple:
+    return camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture

@@ -1,0 +1,98 @@
+"""What a viewport shows while the programs of its picture are compiled, and how long a redraw takes then."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import viewport
+from addon.gfx import images, library
+from tests.viewport.region import SIZE, Region
+
+
+@pytest.fixture
+def cold(scene):
+    """A viewport of a process that has compiled nothing, on a clock by which each part of the work takes a redraw."""
+    library._shaders.clear()
+    made = Region()
+    made.clock.tick = viewport.BUDGET_S
+    yield made
+    made.viewport.release()
+
+
+def test_first_redraw_shows_the_scene_by_programs_that_are_always_the_same(cold):
+    compiled = library.compile_count
+    picture = cold.draw()
+    assert cold.viewport.looks and picture.size == SIZE
+    assert library.compile_count - compiled <= 3  # of a first look, and what fetches and fills need
+    assert not cold.viewport.done
+    seen = images.read(picture)
+    assert seen[..., 3].max() == 1.0 and seen[..., :3].std() > 0.01
+
+
+def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones(cold):
+    before, most, said = library.compile_count, 0, set()
+    for _ in range(200):
+        compiled = library.compile_count
+        cold.draw()
+        most = max(most, library.compile_count - compiled)
+        said.add(cold.viewport.status().split(" ")[0])
+        if not cold.viewport.looks:
+            break
+    assert "Compiling" in said and cold.viewport.frame.samples_done > 0
+    assert library.compile_count - before > 2 * most
+    cold.clock.tick = 0.0
+    cold.rest()
+    warm = Region()
+    expected = warm.rest()
+    warm.viewport.release()
+    np.testing.assert_array_equal(images.read(cold.viewport.picture), expected)
+
+
+@pytest.mark.slow
+def test_edit_that_needs_new_programs_leaves_the_old_picture_until_they_are_there(cold):
+    cold.clock.tick = 0.0
+    before = cold.rest()
+    cold.clock.tick = viewport.BUDGET_S
+    glass = bpy.data.materials.new("Glass")
+    glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
+    bpy.data.objects["Cube"].data.materials.append(glass)
+    cold.viewport.dirty = True
+    cold.viewport.cache.doubt()
+    picture = cold.draw()
+    assert not cold.viewport.done and not cold.viewport.looks
+    np.testing.assert_array_equal(images.read(picture), before)
+    cold.clock.tick = 0.0
+    after = cold.rest()
+    assert np.abs(after - before).max() > 0.05
+
+
+def test_another_view_meanwhile_is_a_first_look_at_it(cold):
+    first = images.read(cold.draw())
+    cold.camera = cold.moved(0.5)
+    second = images.read(cold.draw())
+    assert cold.viewport.looks
+    assert np.abs(first - second).max() > 0.05
+
+
+def test_first_look_at_a_lambertian_plane_under_a_sun(registered, gpu_context, empty_scene):
+    """Radiance of a surface that faces the sun: albedo times (irradiance + that of the light at the eye) over pi."""
+    from addon.surfaces.first_look import HEADLIGHT
+    from addon.ui import ENGINE
+
+    bpy.ops.mesh.primitive_plane_add(size=8)
+    material = bpy.data.materials.new("Red")
+    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.6, 0.2, 0.1, 1.0)
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.object.light_add(type="SUN", rotation=(0.0, 0.0, 0.0))
+    bpy.context.object.data.energy = 3.0
+    bpy.ops.object.camera_add(location=(0, 0, 50), rotation=(0, 0, 0))
+    bpy.context.object.data.angle = 0.05
+    empty_scene.camera = bpy.context.object
+    empty_scene.render.engine = ENGINE
+    library._shaders.clear()
+    region = Region()
+    region.clock.tick = viewport.BUDGET_S
+    seen = images.read(region.draw())[SIZE[1] // 2, SIZE[0] // 2]
+    region.viewport.release()
+    expected = np.array([0.6, 0.2, 0.1]) * (3.0 / np.pi + HEADLIGHT)
+    np.testing.assert_allclose(seen[:3], expected, rtol=0.01)
