@@ -11,7 +11,7 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-all test-fast test-vulkan stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
+.PHONY: help environment demo pictures samples test test-all test-fast test-vulkan stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport bench-beside clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
@@ -90,6 +90,9 @@ bench-references: environment ## what the benchmark compares with, rendered ahea
 
 bench-quick: environment ## time against error, beside EEVEE and Cycles
 	$(PYTHON) -m bench.quick
+
+bench-beside: environment ## before a submission: time and error beside an older commit (OLD=a working tree of it)
+	$(PYTHON) -m bench beside $(OLD) --keep
 
 bench-viewport: environment ## what edits cost in the viewport: times and uploads
 	$(PYTHON) -m bench.viewport
