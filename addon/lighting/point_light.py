@@ -21,6 +21,7 @@ from ..gfx import images, passes
 from ..materials.compiler import may_emit
 from ..sampling.sequence import uniform
 from ..sources import lights
+from . import linked
 from .emissive_triangles import EmissiveTriangles
 from .loop import lighting
 from .media import dimmed
@@ -60,15 +61,20 @@ class PointLight:
             self._emissive = triangles if triangles.power > 0.0 else None
 
     def add(
-        self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target, number: int | None = None
-    ) -> tuple[int, int]:
+        self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target, number: int | None = None,
+        instances: images.Image | None = None,
+    ) -> tuple[int, int]:  # fmt: skip
         """Add this sample's diffuse and glossy direct light, or that of sample `number`, on `surfaces` (by the names of
-        SURFACE_IMAGES) to the two images of `target`. Returns the numbers of passes and of rays a point."""
+        SURFACE_IMAGES) to the two images of `target`. `instances`: of which instance each point is (z: its row in the
+        geometry's image), for lights that leave out objects. Returns the numbers of passes and of rays a point."""
         number = frame.sample if number is None else number
         rows = [*self._lamps(frame, number), *self._world(frame, number), *self._emitted(frame, number)]
         textures, constants = ray_bindings(frame)
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
         program = dimmed(frame, LIGHTING, bound)
+        if instances is not None and linked.has_links(rows):
+            program = linked.linked(program)
+            bound |= {"surface_object": instances, "instances": frame.geometry.instances}
         for first in range(0, len(rows), lights.MOST_LIGHTS):
             some = rows[first : first + lights.MOST_LIGHTS]
             passes.fullscreen(

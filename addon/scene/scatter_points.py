@@ -64,6 +64,7 @@ class ScatterPoints:
         self._positions: list[images.Image] = []  # by run: place relative to the render origin, w = 1 (0: unused)
         self._normals: list[images.Image] = []
         self._entries: list[images.Image] = []  # by run: painted tint and translucency
+        self._instances: images.Image | None = None
         self.cells: list[images.Image] = []  # by run: place, w = area of the cell, m2
         self.bounds: images.Image | None = None  # by row: centre and radius
         # By row of instances: 1 + number of the object in front, or 0, and of that behind; then the objects.
@@ -97,6 +98,16 @@ class ScatterPoints:
     def surface(self, run: int) -> tuple[images.Image, images.Image]:
         """Positions and normals of a run, as shaders/lib/gbuffer.glsl reads them."""
         return self._positions[run % RUNS], self._normals[run % RUNS]
+
+    @property
+    def instances(self) -> images.Image:
+        """z: row of a point's instance in the geometry's image, for all runs."""
+        if self._instances is None:
+            values = np.zeros((self.rows, ROW, 4), np.float32)
+            for one in self.objects:
+                values[one.first_row : one.first_row + one.rows, :, 2] = one.instance
+            self._instances = images.upload(values)
+        return self._instances
 
     def _make(
         self, snapshot: Snapshot, placed: list[Instance], shown: list[int], reach: tuple, maps: list,
@@ -137,6 +148,7 @@ class ScatterPoints:
 
     def _upload(self, blocks: list) -> None:
         self._positions, self._normals, self._entries, self.cells, self.bounds = [], [], [], [], None
+        self._instances = None
         if not blocks:
             return
         place, normal, face, area, entry = (np.concatenate(parts) for parts in zip(*blocks))

@@ -225,7 +225,8 @@ class ImageSpaceSubsurface(Technique):
         black = self._constant_images(size)[1]
         tint = self.points.entries(frame.sample)
         surfaces = {"position": position, "normal": normal, "diffuse": tint, "tint": black, "lobe": black}
-        drawn, rays = self._light.add(frame, {**surfaces, "emission": black}, target)
+        surfaces |= {"emission": black}
+        drawn, rays = self._light.add(frame, surfaces, target, instances=self.points.instances)
         frame.count(self, "passes", drawn)
         images.pool.give(unused)
         frame.count(self, "rays", rays * ROW * self.points.rows)

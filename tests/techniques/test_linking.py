@@ -175,3 +175,24 @@ def test_an_instance_is_linked_as_its_parent_is_before_itself():
     assert (table.of(1, 0).receiver, table.of(1, 2).receiver, table.of(1, 7).receiver) == (1, 2, 1)
     assert table.of(1, 2).blocker == 3, "of blockers the parent says nothing"
     assert table.of(9, 0).unlit == table.of(1, 9).unlit == (2,)
+
+
+def test_a_lamp_that_leaves_out_wax_lights_no_side_of_it(stage):
+    """Points of the mesh that the camera does not see have links, too; a lamp behind lights the other object alone."""
+    wax = stage.principled(
+        Base_Color=(0.8, 0.8, 0.8, 1), Subsurface_Weight=1.0, Subsurface_Scale=4.0, Subsurface_Radius=(1, 1, 1),
+        Specular_IOR_Level=0.0,
+    )  # fmt: skip
+    wax.node_tree.nodes[0].subsurface_method = "BURLEY"
+    body, other = box(stage, 0.0), box(stage, 5.0)
+    body.data.materials[0] = wax
+    stage.light("POINT", (1.0, -2.0, 1.5))
+    stage.camera((0, -4, 0.5), (np.pi / 2, 0, 0), angle=0.4)
+    alone = stage.render(1, (24, 24))["combined"][..., :3]
+    behind = stage.light("POINT", (0, 2, 0.5), energy=500)
+    both_lamps = stage.render(1, (24, 24))["combined"][..., :3]
+    behind.light_linking.receiver_collection = collection([other])
+    left_out = stage.render(1, (24, 24))["combined"][..., :3]
+    bpy.data.collections.remove(behind.light_linking.receiver_collection)
+    assert both_lamps.mean() > 1.2 * alone.mean()
+    assert left_out == pytest.approx(alone, rel=0.02, abs=1e-4)
