@@ -10,8 +10,13 @@ from ..frame.picture import Frame
 from ..kernels.morton import morton_codes
 from ..materials.compiled import CompiledMaterial
 from ..scene.emission_maps import TriangleEmission
+from ..scene.receivers import Receivers
 from ..sources import lights
 
+LONG = 8.0  # squared longest side by area, from which on a triangle is halved; half a square has 4
+LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
+MOST_ASKED = 512  # triangles whose distance from what is lit is measured
+TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
 
 
@@ -61,14 +66,17 @@ class EmissiveTriangles:
         self.radiance = np.concatenate(radiance) if radiance else np.zeros((0, 3))
         self.sided = np.concatenate(sided) if sided else np.zeros(0, bool)
         self.flags = np.concatenate(flags) if flags else np.zeros(0, int)  # of lights.py, for `paths`
-        sign = np.concatenate(normals) if normals else np.zeros(0)
-        order = np.argsort(morton_codes(self.corners.mean(axis=1)), kind="stable")
-        self.corners, self.radiance, self.sided = self.corners[order], self.radiance[order], self.sided[order]
-        self.flags, sign = self.flags[order], sign[order]
-        self.unlit, self.passing = [self.unlit[k] for k in order], [self.passing[k] for k in order]
+        facing = np.concatenate(normals) if normals else np.zeros(0)
+        self.corners, source = compact(self.corners, self.radiance)
         normal = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         double_area = np.linalg.norm(normal, axis=1)
-        self.normal = normal / np.maximum(double_area, 1e-30)[:, None] * sign[:, None]
+        self.normal = normal / np.maximum(double_area, 1e-30)[:, None] * facing[source, None]
+        middle = self.corners.mean(axis=1)
+        order = along_curve(middle, self.normal, _distance(middle, frame.receivers))
+        double_area, self.normal = double_area[order], self.normal[order]
+        self.corners, source = self.corners[order], source[order]
+        self.radiance, self.sided, self.flags = self.radiance[source], self.sided[source], self.flags[source]
+        self.unlit, self.passing = [self.unlit[k] for k in source], [self.passing[k] for k in source]
         weight = np.abs(self.radiance) @ lights.LUMINANCE * double_area / 2
         weight = np.where(np.isfinite(weight), weight, 0.0)
         self.power = float(weight.sum())
@@ -93,6 +101,69 @@ class EmissiveTriangles:
         a, b, c = self.corners[k]
         point = (1 - root) * a + root * (1 - z) * b + root * z * c
         return k, point, float(np.abs(self.radiance[k]) @ lights.LUMINANCE) / self.power
+
+
+def compact(corners: np.ndarray, radiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (N, 3, 3), of which long ones of a large share of the power are halved across their longest side until
+    neither holds; and of which triangle each is a part. Along a curve through space the parts of a strip light stand
+    apart."""
+    source = np.arange(len(corners))
+    luminance = np.abs(radiance) @ lights.LUMINANCE
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    large = LARGE_SHARE * float(np.nan_to_num(luminance * area).sum())
+    done_corners, done_source = [], []
+    while len(corners):
+        sides = np.roll(corners, -1, axis=1) - corners
+        squared = (sides**2).sum(axis=2)
+        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+        with np.errstate(invalid="ignore"):
+            cut = (squared.max(axis=1) > LONG * area) & (luminance[source] * area > large)
+        done_corners.append(corners[~cut])
+        done_source.append(source[~cut])
+        corners, source = corners[cut], source[cut]
+        first = squared[cut].argmax(axis=1)
+        a, b, c = (corners[np.arange(len(corners)), (first + k) % 3] for k in range(3))
+        middle = (a + b) / 2
+        corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        source = np.concatenate([source, source])
+    return (np.concatenate(done_corners), np.concatenate(done_source)) if done_corners else (corners, source)
+
+
+def _distance(places: np.ndarray, receivers: Receivers | None) -> float:
+    """Metres from what is lit to the nearest of `places` (N, 3), about; their extent where nothing is known of that."""
+    if not len(places):
+        return 1.0
+    some = places[:: -(-len(places) // MOST_ASKED)]
+    if receivers is None or not len(receivers.distance):
+        return max(float(np.ptp(places, axis=0).max()), 1e-9)
+    lit = (receivers.low + receivers.high)[:: -(-len(receivers.distance) // 64)] / 2
+    nearest = np.sqrt(((lit[:, None] - some[None]) ** 2).sum(axis=2)).min(axis=1)
+    return max(float(np.median(nearest)), 1e-9)
+
+
+def along_curve(places: np.ndarray, normals: np.ndarray, distance: float) -> np.ndarray:
+    """Order of triangles by place and direction (N, 3) along a Morton curve of six dimensions.
+
+    A step of `distance` counts as much as a turn by a radian: what is lit from so far away sees a small lamp's sides
+    differ, and a large lamp's places.
+    """
+    if not len(places):
+        return np.zeros(0, int)
+    places = places / distance
+    low = places.min(axis=0)
+    # A power of two, so that the steps at which places are told apart are those of directions, too.
+    extent = 2.0 ** max(np.ceil(np.log2(max(float(np.ptp(places, axis=0).max()), 1e-9))), 1.0)
+    turned = normals @ TURN.T
+    codes = [
+        morton_codes(places, (low, low + extent)),
+        morton_codes(turned + 1.0, (np.zeros(3), np.full(3, extent))),
+    ]
+    keys = [np.zeros(len(places), np.uint64) for _ in range(2)]  # of 21 groups of 6 bits the upper and the lower ones
+    for group in range(21):
+        at, key = np.uint64(3 * (20 - group)), keys[group > 9]
+        for code in codes:
+            key[:] = key << np.uint64(3) | code >> at & np.uint64(7)
+    return np.lexsort((keys[1], keys[0]))
 
 
 def _emission(material: CompiledMaterial, side: int) -> tuple[float, float, float]:

@@ -1,9 +1,11 @@
 """Meshes that emit light: the same irradiance as an area light of their radiance, from both sides, with shadows."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
 
+from addon.lighting.emissive_triangles import along_curve, compact
 from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
@@ -158,3 +160,47 @@ def test_each_picture_decides_anew_between_maps_and_rays(floor):
             assert maps_of(floor, "MAPS") > 0
     finally:
         bpy.data.collections.remove(links)
+
+
+def glowing_ball(stage, radius, height, columns=32, rows=16):
+    """A ball of which the camera sees nothing, in the order in which Blender makes its faces."""
+    made = bpy.data.meshes.new("ball")
+    work = bmesh.new()
+    bmesh.ops.create_uvsphere(work, u_segments=columns, v_segments=rows, radius=radius)
+    work.to_mesh(made)
+    work.free()
+    made.materials.append(stage.glow)
+    stage.link("ball", made, (0, 0, height)).visible_camera = False
+
+
+def test_few_samples_find_all_sides_of_a_glowing_ball(floor):
+    """E = L A cos / d^2 of its cross section A. Points drawn in the order of its faces leave sides of it out."""
+    radius, height = 0.2, 1.2
+    glowing_ball(floor, radius, height)
+    squared = (receivers(1)[:, :2] ** 2).sum(axis=1) + height**2
+    expected = (RADIANCE * np.pi * radius**2 * height / squared**1.5).mean()
+    shares = []
+    for seed in range(5):
+        radiance = floor.render(8, SIZE, seed=seed)["diffuse_direct"][..., 0]
+        shares.append(float(radiance.mean()) * np.pi / expected)
+    assert np.sqrt(np.mean(np.square(np.array(shares) - 1))) < 0.1
+
+
+def test_triangles_stand_along_a_curve_by_place_and_side():
+    """Lamps that are far apart for what is lit stand together whole, and their sides together within them."""
+    lamp, side = np.repeat(np.arange(8), 4), np.tile([0, 1, 0, 1], 8)
+    shuffled = np.random.default_rng(1).permutation(32)
+    places = np.column_stack([10.0 * lamp, 0.01 * np.arange(32) % 0.04, np.zeros(32)])[shuffled]
+    normals = np.column_stack([np.zeros((32, 2)), 2.0 * side - 1.0])[shuffled]
+    order = along_curve(places, normals, 1.0)
+    assert np.count_nonzero(np.diff(lamp[shuffled][order])) == 7
+    assert np.count_nonzero(np.diff(side[shuffled][order])) <= 15
+
+
+def test_long_triangles_are_halved():
+    corners = np.array([[[0, 0, 0], [20, 0, 0], [20, 1, 0]], [[0, 0, 5], [1, 0, 5], [1, 1, 5.0]]])
+    parts, source = compact(corners, np.ones((2, 3)))
+    sides = np.roll(parts, -1, axis=1) - parts
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+    assert np.bincount(source, areas) == pytest.approx([10.0, 0.5])
+    assert np.linalg.norm(sides, axis=2).max() < 3.0 and np.count_nonzero(source == 1) == 1
