@@ -23,9 +23,9 @@ from ..sources import lights
 VIEW_PROGRAM = passes.fullscreen_program(
     "media along the view",
     "media/view.frag.glsl",
-    textures=(("RGBA32F", "surface_position"), *ATTENUATION_TEXTURES),
+    textures=(("RGBA32F", "surface_position"),),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(("INT", "light_count"),),
+    constants=(("INT", "light_count"), ("VEC4", "around_eye")),
     outputs=(("VEC4", "out_through"),),
 )
 
@@ -60,20 +60,6 @@ class MediaService(Service):
     name = "media"
     media: Media
 
-    @contextmanager
-    def passing(
-        self, frame: Frame, surfaces: dict[str, images.Image], seen: Block, count: int
-    ) -> Iterator[images.Image]:
-        """An image of what passes between the eye and the `surfaces` (by their bindings), or infinity. `seen`: lamps
-        that the camera sees, `count` of them."""
-        with images.borrowed(*frame.size, "RGBA32F") as target:
-            passes.fullscreen(
-                VIEW_PROGRAM, target,
-                textures={"surface_position": surfaces["surface_position"], **self.media.attenuation()},
-                blocks={"film_view": frame.view_block, "sources": seen}, constants={"light_count": count},
-            )  # fmt: skip
-            yield target.colors[0]
-
     def fade(
         self, frame: Frame, technique: Technique, rays: Rays, target: images.Target, seen: Block, count: int
     ) -> None:
@@ -91,6 +77,34 @@ class MediaService(Service):
     def bindings(self) -> dict[str, images.Image]:
         """Textures of passes made by `attenuated`."""
         return self.media.attenuation()
+
+
+@dataclass(frozen=True)
+class AroundEye(Service):
+    """The camera is in glass or water whose inside absorbs."""
+
+    name = "around the eye"
+    absorbed: tuple[float, float, float]  # 1/m
+
+
+@contextmanager
+def passing_view(
+    frame: Frame, surfaces: dict[str, images.Image], seen: Block, count: int
+) -> Iterator[images.Image | None]:
+    """An image of what passes between the eye and the `surfaces` (by their bindings), or infinity; None if all does.
+    `seen`: lamps that the camera sees, `count` of them."""
+    around = frame.service(AroundEye)
+    if around is None and frame.service(MediaService) is None:
+        yield None
+        return
+    textures = {"surface_position": surfaces["surface_position"]}
+    program = dimmed(frame, VIEW_PROGRAM, textures)
+    with images.borrowed(*frame.size, "RGBA32F") as target:
+        passes.fullscreen(
+            program, target, textures=textures, blocks={"film_view": frame.view_block, "sources": seen},
+            constants={"light_count": count, "around_eye": (*(around.absorbed if around else (0.0,) * 3), 0.0)},
+        )  # fmt: skip
+        yield target.colors[0]
 
 
 @dataclass(frozen=True)

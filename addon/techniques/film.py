@@ -30,7 +30,7 @@ from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..lighting import repeated_light
-from ..lighting.media import MediaEmission, MediaService
+from ..lighting.media import AroundEye, MediaEmission, MediaService, passing_view
 from ..scene.materials import SURFACE_IMAGES, may_be_glossy
 from ..scene.view import VIEW
 from ..sources import lights
@@ -147,7 +147,7 @@ class Film(Technique):
     )
     reads = SURFACES
     finishes = tuple(path.image for path in LIGHT)
-    requests = (MediaService, MediaEmission, *film_points.AT_POINTS)
+    requests = (MediaService, AroundEye, MediaEmission, *film_points.AT_POINTS)
     writes = (
         *(Write(name, "RGBA32F", description, True, by_need=True) for name, (_, description) in SUMS.items()),
         *(Write(path.image, "RGBA32F", path.description, True, path.by_need) for path in LIGHT),
@@ -321,7 +321,6 @@ class Film(Technique):
         seen |= {f"film.{path}": image for path, image in light.items()}
         seen = {name: image for name, image in seen.items() if name in self._shown}
         frame.count(self, "images filtered", len(seen))
-        media = frame.service(MediaService)
         offset = frame.film_offset(point)
         for service in map(frame.service, film_points.AT_POINTS):
             if service is not None:
@@ -329,10 +328,8 @@ class Film(Technique):
         with ExitStack() as stack:
             if self._limits:
                 seen = stack.enter_context(clamping.clamped(seen, self._limits))
-            through = None
-            if media is not None:
-                through = stack.enter_context(media.passing(frame, surfaces, self._lights, self._light_count))
-            drawn = len(self._limits) + (media is not None) + film_filter.add(frame, seen, offset, share, through)
+            through = stack.enter_context(passing_view(frame, surfaces, self._lights, self._light_count))
+            drawn = len(self._limits) + (through is not None) + film_filter.add(frame, seen, offset, share, through)
             frame.count(self, "passes", drawn)
 
     def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:

@@ -26,7 +26,8 @@ from ..frame.light_paths import IN_MEDIA
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..lighting.media import MediaService
+from ..lighting.media import AroundEye, MediaService
+from ..scene.around_eye import absorbed_around_eye
 from ..scene.media import Media, has_media
 from ..snapshot.scene import Snapshot
 
@@ -42,7 +43,7 @@ class MediaAttenuation(Technique):
             4, 256, draft=48,
         ),
     )  # fmt: skip
-    provides = (MediaService,)
+    provides = (MediaService, AroundEye)
     owns = (IN_MEDIA,)
 
     def __init__(self):
@@ -56,6 +57,9 @@ class MediaAttenuation(Technique):
         resolution = frame.settings.get(self, "resolution")
         self.media.update(frame.snapshot, frame.materials.compiled, frame.geometry.origin, resolution)
         frame.ledger.notes = (*frame.ledger.notes, *(n for n in self.media.notes if n not in frame.ledger.notes))
+        around = absorbed_around_eye(frame.snapshot, frame.materials.compiled)
+        if around.any():
+            frame.provide(AroundEye(tuple(around.tolist())))
         if self.media.found:
             frame.provide(MediaService(self.media))
         frame.counters.setdefault(self.name, {}).update(media=len(self.media.found), cells=self.media.cells)

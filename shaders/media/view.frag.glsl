@@ -1,6 +1,12 @@
 // What the media let pass of the light that comes along each pixel's view ray from the surface, or from infinity; where a
-// lamp is seen, which outshines what is behind it, from there.
+// lamp is seen, which outshines what is behind it, from there. `around_eye`: what a solid absorbs that the eye is in.
+#include "lib/math.glsl"
+#include "lib/random.glsl"
+#ifdef MEDIA
 #include "media/media.glsl"
+#else
+#define FARTHEST_MEDIUM 1e29
+#endif
 #include "media/view_ray.glsl"
 #include "light/sources.glsl"
 
@@ -15,5 +21,9 @@ void main()
     ray.limit = (max_component(abs(radiance)) > 0.0) ? min(ray.limit, hit_distance) : ray.limit;
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 41).x;
-  out_through = vec4(media_transmittance(ray.origin, ray.direction, ray.limit, salt), ray.hit ? 1.0 : 0.0);
+  vec3 through = exp(-min(around_eye.rgb * ray.limit, vec3(1e30)));
+#ifdef MEDIA
+  through *= media_transmittance(ray.origin, ray.direction, ray.limit, salt);
+#endif
+  out_through = vec4(through, ray.hit ? 1.0 : 0.0);
 }

@@ -9,7 +9,7 @@ from addon.materials.volume import PHASES, Medium
 from addon.scene.media import phase_values
 from addon.snapshot.volumes import openvdb
 from addon.ui.properties import settings_of
-from tests.techniques.foggy_stage import absorber, box, fog, glowing_floor, volume
+from tests.techniques.foggy_stage import absorber, box, fill, fog, glowing_floor, volume
 
 trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
 
@@ -515,3 +515,19 @@ def test_denoising_keeps_the_light_of_a_shaft_and_takes_its_noise(stage):
     assert light["denoised"].mean() == pytest.approx(light["truth"].mean(), rel=0.03)
     error = {name: np.square(light[name] - light["truth"]).mean() for name in ("noisy", "denoised")}
     assert error["denoised"] < 0.8 * error["noisy"]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_a_camera_in_water_sees_what_the_water_leaves(stage, turn):
+    """What stands in it through one stretch, what stands behind its face through that and the interface."""
+    water = stage.material("ShaderNodeBsdfGlass", IOR=1.33, Roughness=0.0)
+    fill(water.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.1, 0.6, 0.8, 1), Density=0.5)
+    stage.camera((0, 0, 0), (0, 0, 0), angle=0.02)  # looks down
+    wall = glowing_floor(stage, z=-1.5, strength=1.0)
+    box(stage, water, (-1, -1, -1), (1, 1, 1), turn=(0, 0, turn))
+    absorbed = 0.5 * np.array([0.9, 0.4, 0.2])
+    seen = stage.render(4, size=(8, 8))["combined"][..., :3].mean(axis=(0, 1))
+    interface = 1 - ((1.33 - 1) / (1.33 + 1)) ** 2
+    assert seen == pytest.approx(interface * np.exp(-absorbed), rel=0.01)  # what is mirrored is chosen at random
+    wall.location.z = 0.9  # in the water, 0.6 m below the camera
+    assert stage.render(1, size=(8, 8))["combined"][4, 4, :3] == pytest.approx(np.exp(-0.6 * absorbed), rel=1e-3)
