@@ -27,7 +27,7 @@ from .draw import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
 MOST_CELLS = 32  # that are averaged one by one
-BANDS = 4  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
+BANDS = 8  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
 VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
 REFLECTANCE = passes.fullscreen_program(
@@ -40,6 +40,8 @@ REFLECTANCE = passes.fullscreen_program(
 )
 # For programs that read the image where a technique brings what mirrors and glass throw on diffuse surfaces.
 MIRRORS_OWNED = (("MIRRORS_OWNED", "1"),)
+TURNED = (("TURNED_NORMALS", "1"),)  # where a material turns normals
+TURNING = ("ShaderNodeNormalMap", "ShaderNodeBump")
 
 
 class Reflectance:
@@ -52,7 +54,8 @@ class Reflectance:
     def update(self, frame: Frame) -> None:
         """Draw anew the materials that have changed or whose surfaces have."""
         self._update(frame)
-        self.image.defines = MIRRORS_OWNED if frame.owned(LIGHT_SPECULAR_DIFFUSE) else ()
+        owned = MIRRORS_OWNED if frame.owned(LIGHT_SPECULAR_DIFFUSE) else ()
+        self.image.defines = (*owned, *(TURNED if _turns_normals(frame) else ()))
 
     def _update(self, frame: Frame) -> None:
         keys = self._keys_of(frame)
@@ -135,3 +138,9 @@ def _values(view: dict) -> dict:
         **dict.fromkeys(("bits_x", "bits_y", "bits_z", "bits_w"), 0), "visibility": EVERY_FLAG,
         "footprint_exact": 0.0, "footprint_first": 0.0,
     }  # fmt: skip
+
+
+def _turns_normals(frame: Frame) -> bool:
+    """Whether a material that is shown has a normal map or bump."""
+    graphs = (frame.snapshot.materials[k].graph for k in frame.snapshot.used_materials)
+    return any(node.type in TURNING for graph in graphs for node in graph.nodes.values())

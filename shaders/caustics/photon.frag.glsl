@@ -15,7 +15,7 @@
 #include "trace/solid.glsl"
 #endif
 
-#define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
+#define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
 #define PATHS 8192.0
 
 // Fractional parts of multiples of two irrational numbers: other numbers for each interface, the same for all photons. In

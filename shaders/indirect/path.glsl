@@ -11,12 +11,13 @@
 #include "media/media.glsl"
 #endif
 
-#define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
+#define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
 
 struct Vertex {
   vec3 position;
   vec3 normal;  // of the triangle, on the side that the ray came from, to which it sends light
   vec3 lit;     // the same, or on the other side: that from which light reaches it
+  vec3 turned;  // that, as normal maps and bumps turn it: light straight from sources is reflected by it
   Reflection reflection;
 #ifdef MIRRORS_OWNED
   bool photons;  // lamps' light that it mirrors arrives as photons of caustics
@@ -73,9 +74,27 @@ Reflection mean_reflection(ivec2 hit)
   return mean;
 }
 
-// What a point reflects: exactly where the camera sees it, else the mean of its material.
-Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
+#ifdef TURNED_NORMALS
+// The normal of a triangle as the material of that turns it in the mean, on faces that look alike.
+vec3 mean_turned(ivec2 hit, vec3 normal)
 {
+  int material = triangle_material(hit);
+  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  ivec2 place = ivec2(material & 15, (material >> 4) + 4 * rows);
+  vec4 x = reflectance_fetch(place);
+  vec4 y = reflectance_fetch(place + ivec2(0, rows));
+  vec4 z = reflectance_fetch(place + ivec2(0, 2 * rows));
+  vec3 mixed = reflectance_fetch(place + ivec2(0, 3 * rows)).xyz;
+  vec3 moved = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
+  float alike = dot(vec3(x.w, y.w, z.w), normal * normal) + 2.0 * dot(mixed, normal.yzx * normal.zxy);
+  return (alike > 1e-3) ? safe_normalize(normal + moved / alike) : normal;
+}
+#endif
+
+// What a point reflects: exactly where the camera sees it, else the mean of its material.
+Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal, out vec3 turned)
+{
+  turned = normal;
   ivec2 pixel;
   float slant;
   float footprint;
@@ -85,10 +104,16 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
       Surface s = SURFACE_READ(pixel);
       // Of a holdout the picture has cut out what it reflects.
       if (s.holdout < 1.0 && dot(s.geometric_normal, normal) > 0.9) {
+#ifdef TURNED_NORMALS
+        turned = (s.bump > 0.0) ? s.normal : normal;
+#endif
         return surface_reflection(s, slant);
       }
     }
   }
+#ifdef TURNED_NORMALS
+  turned = mean_turned(hit, normal);
+#endif
   return mean_reflection(hit);
 }
 
@@ -105,7 +130,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   if (dot(met.normal, direction) > 0.0) {
     met.normal = -met.normal;
   }
-  met.reflection = reflection_at(hit, met.position, met.normal);
+  met.reflection = reflection_at(hit, met.position, met.normal, met.turned);
 #ifdef MIRRORS_OWNED
   int material = triangle_material(hit);
   met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
@@ -116,6 +141,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
     // Leaves, paper: one of both sides is looked at, at random.
     bool passes = to_unit(hash3(uvec3(salt, uint(hit.x), uint(hit.y))).x) < through;
     met.lit = passes ? -met.normal : met.normal;
+    met.turned = passes ? -met.turned : met.turned;
     float shine = passes ? 0.0 : 1.0 / max(1.0 - through, 1e-6);
     met.reflection.straight *= shine;
     met.reflection.grazing *= shine;
@@ -179,8 +205,8 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
 vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
 {
   vec3 position = met.position;
-  vec3 normal = met.lit;
-  vec3 origin = ray_origin(position, normal);
+  vec3 normal = met.turned;
+  vec3 origin = ray_origin(position, met.lit);
   vec3 sum = vec3(0.0);
   uint roll = salt;
   for (int group = 0; group < min(light_rays, light_count); group++) {
@@ -192,6 +218,7 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
     for (int i = group; i < light_count; i += light_rays) {
       vec3 direction;
       vec3 arriving = unblocked_irradiance(light_read(i), position, normal, direction);
+      arriving *= (dot(direction, met.lit) > 0.0) ? 1.0 : 0.0;
       float share = luminance(abs(arriving));
       total += share;
       if (draw_passing(share, total, roll)) {

@@ -344,3 +344,28 @@ def test_no_light_is_passed_on_through_a_wall(stage, render):
     light = render(1, samples=8)["diffuse_indirect"][..., 0]
     half = light.shape[1] // 2
     assert light[:, : half - 2].max() < 0.01 * light[:, half + 2 :].mean()
+
+
+@pytest.mark.parametrize("seen", [False, True])
+def test_a_floor_whose_normals_are_turned_throws_the_light_that_it_reflects(stage, seen):
+    """Under a sun overhead a normal map of one colour leaves the cosine of its tilt, seen by the camera or not."""
+    color, strength = np.array([1.0, 0.5, 1.0]), 1.5
+    turned = (2 * color - 1) * (strength, strength, 1.0)
+    found = []
+    for mapped in (False, True):
+        stage.clear()
+        floor = stage.diffuse(0.8)
+        if mapped:
+            nodes = floor.node_tree.nodes
+            turning = nodes.new("ShaderNodeNormalMap")
+            turning.inputs["Color"].default_value, turning.inputs["Strength"].default_value = (*color, 1), strength
+            floor.node_tree.links.new(turning.outputs[0], nodes["Diffuse BSDF"].inputs["Normal"])
+        layer = stage.floor(3.0, material=floor).data.uv_layers.new(name="UVMap")
+        for corner, place in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
+            layer.uv[corner].vector = place
+        stage.rectangle((-1, -1), (1, 1), turn=(np.pi / 2, 0, 0), location=(0, 1, 1), material=stage.diffuse(0.8))
+        stage.light("SUN", (0, 0, 5), angle=0.0)
+        stage.camera((0, -2 if seen else 0.5, 1), (np.pi / 2, 0, 0), angle=1.6 if seen else 0.9)
+        image = stage.render(4, (16, 16), bounces=1)["diffuse_indirect"][..., 0]
+        found.append(image[7:9, 7:9].mean())
+    assert found[1] / found[0] == pytest.approx(turned[2] / np.linalg.norm(turned), rel=0.06)
