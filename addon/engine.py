@@ -142,9 +142,9 @@ class CandelaEngine(bpy.types.RenderEngine):
             self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
 
-    def _take(self, depsgraph, shared: Session, around: tuple[Moment, ...] | None = None) -> Snapshot:
+    def _take(self, depsgraph, shared: Session, around: tuple[Moment, ...] | None = None, camera=None) -> Snapshot:
         size = self.resolution_x, self.resolution_y
-        return take(depsgraph, shared.cache, *size, camera=self.camera_override, around=around)
+        return take(depsgraph, shared.cache, *size, camera=camera or self.camera_override, around=around)
 
     def _take_moments(self, depsgraph, shared: Session, central: Snapshot) -> shutter.Moments | None:
         """The scene while the shutter is open, where anything moves. It is evaluated now, while Blender keeps it."""
@@ -156,8 +156,13 @@ class CandelaEngine(bpy.types.RenderEngine):
             frame, subframe = divmod(own + time, 1.0)
             self.frame_set(int(frame), subframe)
 
+        # Markers may show another camera a moment later: a cut, as in Cycles, is between pictures.
+        camera = self.camera_override or depsgraph.scene_eval.camera
+        camera = camera and camera.original
         times = shutter.shutter_times(scene, min(settings.motion_steps, settings.samples))
-        return shutter.take_moments(central, times, moved_to, lambda: self._take(depsgraph, shared))
+        return shutter.take_moments(
+            central, times, moved_to, lambda: self._take(depsgraph, shared, camera=camera), shutter.blurs(camera)
+        )
 
     def _frames_around(self, depsgraph) -> tuple[Moment, ...] | None:
         """The scene in the frames before and after, for the Vector pass. It stands at its own again afterwards."""
@@ -252,6 +257,8 @@ class CandelaEngine(bpy.types.RenderEngine):
         if layer.use_pass_vector and shutter.is_blurred(scene, layer):
             texts.append("the Vector pass is zero with motion blur, as in Cycles: what moves is blurred already.")
         notes = () if self.is_preview else tuple(Note(f"View layer '{layer.name}'", text) for text in texts)
+        if shutter.is_blurred(scene, layer) and not self.is_preview:
+            notes += tuple(shutter.notes_of(scene))
         keep = None
         if taken is not None:
             keep = partial(taken.__setitem__, layer.name)

@@ -244,7 +244,8 @@ def _instances(
                     of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
                     of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
                     of_object.terminator, of_object.own, of_object.caustics_caster, of_object.asset,
-                    of_object.group, links, of_object.shadow_catcher,
+                    of_object.group, links, of_object.shadow_catcher, blurred=of_object.blurred,
+                    deforms=of_object.deforms,
                 )
             )  # fmt: skip
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.

@@ -85,6 +85,8 @@ class ObjectFacts:
     asset: str  # name of the last ancestor
     ancestors: tuple[int, ...]  # uids of the original parent, its parent, and so on
     group: str
+    blurred: bool  # whether motion blur shows that it moves, or that its vertices do
+    deforms: bool
     notes: tuple[Note, ...]
 
 
@@ -167,6 +169,8 @@ def walk(
                         asset=ancestors[-1].name if ancestors else "",
                         ancestors=tuple(one.original.session_uid for one in ancestors),
                         group=owner.lightgroup,
+                        blurred=_says(owner, parent, "use_motion_blur"),
+                        deforms=_says(owner, parent, "use_deform_motion"),
                         notes=_object_notes(owner, kind, original.name, final),
                     )
                     if made != facts:
@@ -256,6 +260,11 @@ def _visibility(owner, parent, indirect_only: bool) -> Visibility:
     if parent is not None:
         flags = tuple(map(and_, flags, _flags(parent)))
     return _visibility_of((flags[0] and not indirect_only, *flags[1:]))
+
+
+def _says(owner, parent, name: str) -> bool:
+    """A switch of Cycles' of an object and of what instances it: on where it is on of both."""
+    return all(getattr(getattr(one, "cycles", None), name, True) for one in (owner, parent) if one is not None)
 
 
 def _flags(one) -> tuple[bool, ...]:

@@ -67,6 +67,7 @@ class RawMesh:
     active_color: str = ""
     generated: np.ndarray | None = None  # (V, 3) float32
     flat: bool = False  # no face is smooth
+    velocity: np.ndarray | None = None  # (V, 3) float32, m/s
 
     def digest(self) -> bytes:
         """128 bits over everything that `build_mesh` uses; equal digests mean equal content."""
@@ -74,7 +75,7 @@ class RawMesh:
         head = (self.slots, self.flat, self.active_uv, self.active_color, tuple(self.uv_maps), tuple(self.colors))
         state.update(repr((head, len(self.positions), len(self.corner_vertices), len(self.face_starts))).encode())
         arrays = [self.positions, self.corner_vertices, self.corner_normals, self.face_starts]
-        arrays += [array for array in (self.face_slots, self.generated) if array is not None]
+        arrays += [array for array in (self.face_slots, self.generated, self.velocity) if array is not None]
         for array in [*arrays, *self.uv_maps.values(), *self.colors.values()]:
             state.update(array.data if array.size else b"")
         return state.digest()
@@ -118,7 +119,16 @@ def read_mesh(mesh, wanted: Wanted) -> RawMesh:
         active_color=active_color,
         generated=_read_generated(mesh) if wanted.generated else None,
         flat=mesh.normals_domain == "FACE",
+        velocity=_velocity(mesh, len(mesh.vertices)),
     )
+
+
+def _velocity(data, count: int) -> np.ndarray | None:
+    """(count, 3) of points, m/s; None where there is none."""
+    attribute = data.attributes.get("velocity")
+    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR") or not count:
+        return None
+    return _finite(_attribute(data, "velocity", "vector", count, np.float32, 3))
 
 
 def _read_strands(data, wanted: Wanted) -> RawMesh:
@@ -161,13 +171,16 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
             if layer.data_type == "FLOAT2" and layer.domain == "CURVE" and count:
                 places = _finite(_attribute(data, layer.name, "vector", count, np.float32, 2))
                 uv_maps[layer.name] = np.ascontiguousarray(places[curve[corners]])
+    velocity = _velocity(data, len(points))
+    if velocity is not None:
+        velocity = np.ascontiguousarray(velocity[source])
     generated = None
     if wanted.generated and len(positions):
         low, high = positions.min(axis=0), positions.max(axis=0)
         generated = ((positions - low) / np.maximum(high - low, 1e-30)).astype(np.float32)
     return RawMesh(
         positions, corners, normals[corners], np.arange(0, len(corners), 3, dtype=np.int32), None, slots=1,
-        uv_maps=uv_maps, active_uv=next(iter(uv_maps), ""), colors=colors, generated=generated,
+        uv_maps=uv_maps, active_uv=next(iter(uv_maps), ""), colors=colors, generated=generated, velocity=velocity,
     )  # fmt: skip
 
 
@@ -234,6 +247,7 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
         active_color=raw.active_color,
         tangents=tangents,
         generated=raw.generated,
+        velocity=raw.velocity,
         bounds_min=low,
         bounds_max=high,
     )

@@ -1,7 +1,8 @@
 """Where things were a frame ago and will be in a frame, for the Vector pass: places of instances, cameras and vertices.
 
-Read while Blender's scene stands at those frames (engine.py). Vertices count as the same where a mesh has as many of
-them in all three frames, as in Cycles; what appears or goes does not move. Hair and points move with their objects.
+Read while Blender's scene stands at those frames (engine.py). Vertices with a `velocity` move along it; others count as
+the same where a mesh has as many of them in all three frames, as in Cycles; what appears or goes does not move. Hair
+and points without one move with their objects.
 """
 
 from __future__ import annotations
@@ -56,7 +57,11 @@ def with_motion(snapshot: Snapshot, before: Moment, after: Moment) -> Snapshot:
         if one.mesh in deforming:
             continue
         deforming.add(one.mesh)
-        deltas = [_delta(mesh.positions, moment.positions.get(one.key)) for moment in (before, after)]
+        if mesh.velocity is not None:
+            step = mesh.velocity / np.float32(snapshot.moment.per_second)
+            deltas = [step * np.float32(frames) for frames in STEPS]
+        else:
+            deltas = [_delta(mesh.positions, moment.positions.get(one.key)) for moment in (before, after)]
         if any(delta is not None for delta in deltas):
             still = np.zeros_like(mesh.positions)
             moved = tuple(still if delta is None else delta for delta in deltas)

@@ -65,6 +65,7 @@ class Mesh:
     undisplaced: Mesh | None = None
     shells: tuple[tuple[int, int], ...] = ()
     motion: tuple[np.ndarray, np.ndarray] | None = None  # (V, 3) each: to where vertices were a frame ago, and will be
+    velocity: np.ndarray | None = None  # (V, 3) float32 m/s, of fluids and caches: stands for motion between frames
 
     @property
     def triangle_count(self) -> int:
@@ -127,6 +128,8 @@ class Instance:
     links: Links = NO_LINKS
     shadow_catcher: bool = False
     attributes: tuple[tuple[float, ...], ...] = ()  # that Attribute nodes read of it and of its instancer, by column
+    blurred: bool = True  # whether motion blur shows that it moves, or that its vertices do
+    deforms: bool = True
 
 
 @dataclass(frozen=True, eq=False)

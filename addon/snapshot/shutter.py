@@ -5,6 +5,7 @@ says. Step k of n is looked at where the shutter's curve has let (k + 1/2) / n o
 new scenes have, in the middle of the k-th of n equal parts. Blender evaluates the scene anew at each moment (`moved_to`
 of the engine), so that whatever moves is blurred along its own path: objects, cameras, lamps, bones and shape keys,
 materials with keyframes. Cycles interpolates between a few such evaluations instead, and holds lamps and materials.
+What holds still here: steady.py.
 
 Steps at which the scene is the same are one step; where it is the same at all of them there is nothing to blur.
 
@@ -13,22 +14,21 @@ Steps at which the scene is the same are one step; where it is the same at all o
 | time | one evaluation and one sync for each step; meshes that stay are not read again |
 | memory | arrays of meshes that change their shape, once for each step |
 
-Not followed: `object.cycles.use_motion_blur`, which holds single objects still.
+Not followed: rolling shutters; a note says so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from .scene import Image, Instance, Mesh, Snapshot, Volume, VolumeInstance
+from .scene import Note, Snapshot
+from .steady import equal, held
 
 CURVE_POINTS = 256  # at which the shutter's curve is asked
 _BEGINS = {"START": 0.0, "CENTER": -0.5, "END": -1.0}  # of the shutter, in shutter times from the frame
-_VERSIONED = (Image, Mesh, Volume)  # equal if key and version are
-_BY_IDENTITY = (Instance, VolumeInstance)  # the sync hands out the same object where nothing has changed
 
 
 @dataclass(frozen=True)
@@ -61,27 +61,50 @@ def shutter_times(scene, count: int) -> list[float]:
 
 
 def take_moments(
-    central: Snapshot, times: Sequence[float], moved_to: Callable[[float], None], take: Callable[[], Snapshot]
+    central: Snapshot,
+    times: Sequence[float],
+    moved_to: Callable[[float], None],
+    take: Callable[[], Snapshot],
+    camera_blurred: bool = True,
 ) -> Moments | None:
     """The scene at `times`, in frames from its own; None where it is the same at all of them.
 
     `central`: its snapshot at its own frame. `moved_to(time)` evaluates it at a time, `take()` reads it. It is left at
-    its own frame, whatever happens.
+    its own frame, whatever happens. `camera_blurred`: whether the camera moves, too.
     """
-    found, steps = [central], []
+    taken = []
     try:
         for time in times:
             moved_to(time)
-            now = take()
-            if not alike(now, found[-1]):
-                found.append(replace(now, moment=central.moment))  # what only the eye asks for is that of the frame
-            steps.append(len(found) - 1)
+            taken.append(take())
     finally:
         moved_to(0.0)
+    found, steps = [central], []
+    for now in held(central, taken, times):
+        now = replace(now, moment=central.moment)  # what only the eye asks for is that of the frame
+        if not camera_blurred:
+            now = replace(now, camera=central.camera)
+        if not alike(now, found[-1]):
+            found.append(now)
+        steps.append(len(found) - 1)
     used = sorted(set(steps))
     if used == [0]:
         return None
     return Moments(tuple(found[k] for k in used), tuple(used.index(k) for k in steps))
+
+
+def notes_of(scene) -> list[Note]:
+    """What of Blender's settings is not followed."""
+    cycles = getattr(scene, "cycles", None)  # there while the Cycles add-on is enabled
+    if getattr(cycles, "rolling_shutter_type", "NONE") == "NONE":
+        return []
+    text = "the rolling shutter of Cycles is not drawn: all rows of the picture are exposed at the same time."
+    return [Note("Motion blur", text)]
+
+
+def blurs(owner) -> bool:
+    """Whether an object's motion is seen; what is no object of Cycles' moves."""
+    return getattr(getattr(owner, "cycles", None), "use_motion_blur", True)
 
 
 _ASIDE = {"notes", "moment", "sync_stats", "scene_name"}
@@ -89,22 +112,4 @@ _ASIDE = {"notes", "moment", "sync_stats", "scene_name"}
 
 def alike(a: Snapshot, b: Snapshot) -> bool:
     """Whether two snapshots show the same, but for when."""
-    return all(_equal(getattr(a, one.name), getattr(b, one.name)) for one in fields(a) if one.name not in _ASIDE)
-
-
-def _equal(a, b) -> bool:
-    if a is b:
-        return True
-    if type(a) is not type(b) or isinstance(a, _BY_IDENTITY):
-        return False
-    if isinstance(a, _VERSIONED):
-        return (a.key, a.version) == (b.key, b.version)
-    if isinstance(a, np.ndarray):
-        return a.shape == b.shape and bool(np.array_equal(a, b))
-    if isinstance(a, dict):
-        return a.keys() == b.keys() and all(_equal(a[key], b[key]) for key in a)
-    if isinstance(a, (tuple, list)):
-        return len(a) == len(b) and all(map(_equal, a, b))
-    if is_dataclass(a):
-        return all(_equal(getattr(a, one.name), getattr(b, one.name)) for one in fields(a))
-    return a == b
+    return all(equal(getattr(a, one.name), getattr(b, one.name)) for one in fields(a) if one.name not in _ASIDE)

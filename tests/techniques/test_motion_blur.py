@@ -225,15 +225,114 @@ def test_values_of_surfaces_and_mattes_are_those_of_all_moments(blurred, written
 
 
 def test_what_is_seen_for_a_part_of_the_time_has_a_name(blurred, written):
+    """The cube stands before the camera at the end of the shutter alone."""
     named_things(blurred)
     cube = blurred.scene.objects["Cube"]
-    for frame, hidden in ((0, False), (1, True)):
-        cube.hide_render = hidden
-        cube.keyframe_insert("hide_render", frame=frame)
+    cube.animation_data_clear()
+    keyed(cube, "location", [(-9, 0, 0), (0, 0, 0)], (1, 1.25))
     found = written.written("CANDELA", 4, (32, 24))
     assert 0.1 < written.coverage(found, "Object", "Cube").max() < 0.9
     (names,) = (text for field, text in found["header"].items() if field.endswith("/manifest"))
     assert set(json.loads(names)) == {"Plane", "Cube"}
+
+
+def jumping(block, path, before, after):
+    """A property that changes at frame 1."""
+    for frame, value in ((0, before), (1, after)):
+        setattr(block, path, value)
+        block.keyframe_insert(path, frame=frame)
+    for curve in curves_of(block.id_data):
+        for key in curve.keyframe_points:
+            key.interpolation = "CONSTANT"
+    bpy.context.scene.frame_set(1)
+
+
+def cut_between_cameras(stage, card):
+    other = bpy.data.objects.new("other", stage.scene.camera.data)
+    other.location = (40, 0, 10)
+    stage.scene.collection.objects.link(other)
+    for frame, camera in ((0, other), (1, stage.scene.camera)):
+        stage.scene.timeline_markers.new("cut", frame=frame).camera = camera
+    stage.scene.frame_set(1)
+
+
+def cut_to_an_object(stage, card):
+    jumping(card, "hide_render", True, False)
+
+
+def cut_to_a_colour(stage, card):
+    node = next(one for one in card.data.materials[0].node_tree.nodes if one.type == "EMISSION")
+    jumping(node.inputs["Strength"], "default_value", 5.0, 1.0)
+
+
+@pytest.mark.parametrize("cut", [cut_between_cameras, cut_to_an_object, cut_to_a_colour])
+def test_cuts_are_hard(blurred, cut):
+    """As in Cycles, a frame shows what is there at its own time, and nothing of what was a moment before."""
+    card = blurred.rectangle((-5, -5), (5, 5), material=blurred.material("ShaderNodeEmission", Strength=1.0))
+    blurred.camera_above(4.0)
+    cut(blurred, card)
+    try:
+        np.testing.assert_allclose(blurred.render(8, (8, 6))["emission"][..., 0], 1.0, atol=1e-3)
+    finally:
+        blurred.scene.timeline_markers.clear()
+
+
+def test_an_object_may_leave_its_motion_out(blurred):
+    card = lamp_that_moves(blurred)
+    card.cycles.use_motion_blur = False
+    row = blurred.render(8, SIZE)["emission"][24, :, 0]
+    x = (np.arange(SIZE[0]) + 0.5) / SIZE[0] * 4.0 - 2.0
+    np.testing.assert_allclose(row[np.abs(x) < 0.2], 1.0, atol=1e-3)
+    assert not row[np.abs(x) > 0.4].any()
+
+
+def test_an_object_may_leave_its_deformation_out(blurred):
+    card = blurred.rectangle((-0.5, -0.5), (0.5, 0.5), material=blurred.material("ShaderNodeEmission", Strength=1.0))
+    card.shape_key_add(name="Basis")
+    key = card.shape_key_add(name="Moved")
+    for point in key.data:
+        point.co.x += 4.0
+    key.slider_min = -1.0
+    keyed(key, "value", [-0.5, 0.5])
+    card.cycles.use_deform_motion = False
+    blurred.camera_above(4.0)
+    assert (blurred.render(8, SIZE)["emission"][24, 26:38, 0] > 0.999).all()
+    card.cycles.use_deform_motion = True
+    assert blurred.render(8, SIZE)["emission"][24, 26:38, 0].min() < 0.9
+
+
+@pytest.mark.parametrize("kind", ["mesh", "points"])
+def test_a_velocity_stands_for_motion(blurred, kind):
+    """At 48 m/s and 24 frames a second half a frame is one metre; what is half a metre wide is seen for half of it."""
+    glow = blurred.material("ShaderNodeEmission", Strength=1.0)
+    if kind == "mesh":
+        card = blurred.rectangle((-0.25, -0.25), (0.25, 0.25), material=glow)
+        card.data.attributes.new("velocity", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", [48.0, 0, 0] * 4)
+    else:
+        cloud = bpy.data.pointclouds.new("points")
+        cloud.resize(1)
+        for name, type_name in (("radius", "FLOAT"), ("velocity", "FLOAT_VECTOR")):
+            if name not in cloud.attributes:
+                cloud.attributes.new(name, type_name, "POINT")
+        cloud.attributes["radius"].data[0].value = 0.25
+        cloud.attributes["velocity"].data[0].vector = (48.0, 0, 0)
+        cloud.materials.append(glow)
+        blurred.link("points", cloud)
+    blurred.camera_above(4.0)
+    row = blurred.render(16, SIZE)["emission"][24, :, 0]
+    x = (np.arange(SIZE[0]) + 0.5) / SIZE[0] * 4.0 - 2.0
+    assert row[np.abs(x) < 0.1].mean() == pytest.approx(0.5, abs=0.07)
+    assert row[np.abs(x) > 0.8].max() == 0.0 and row[np.abs(x) < 0.6].min() > 0.0
+
+
+def test_a_rolling_shutter_is_warned_of(blurred):
+    lamp_that_moves(blurred)
+    blurred.scene.cycles.rolling_shutter_type = "TOP"
+    try:
+        blurred.render(2, (8, 6))
+        assert any("rolling shutter" in str(note) for note in blurred.ledger.notes)
+    finally:
+        blurred.scene.cycles.rolling_shutter_type = "NONE"
 
 
 def test_mattes_and_values_of_slices_are_those_of_the_whole(blurred, written):
