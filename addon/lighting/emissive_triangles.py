@@ -18,6 +18,7 @@ LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
 MOST_ASKED = 512  # triangles whose distance from what is lit is measured
 TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
+PATHS["volume"] = lights.DIFFUSE_FLAG  # media ask for no flag: their lights are those that they see
 
 
 class EmissiveTriangles:

@@ -350,7 +350,7 @@ class Airlight(Technique):
         used = frame.snapshot.used_materials
         self._triangles = None
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
-            triangles = EmissiveTriangles(frame, ("diffuse",))
+            triangles = EmissiveTriangles(frame, ("volume",))
             self._triangles = triangles if triangles.power > 0 else None
         self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.volume
         # Through fog without an end nothing comes from infinity.

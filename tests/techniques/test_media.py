@@ -531,3 +531,15 @@ def test_a_camera_in_water_sees_what_the_water_leaves(stage, turn):
     assert seen == pytest.approx(interface * np.exp(-absorbed), rel=0.01)  # what is mirrored is chosen at random
     wall.location.z = 0.9  # in the water, 0.6 m below the camera
     assert stage.render(1, size=(8, 8))["combined"][4, 4, :3] == pytest.approx(np.exp(-0.6 * absorbed), rel=1e-3)
+
+
+def test_air_is_lit_by_the_meshes_that_volumes_may_see(stage):
+    """Of a glowing mesh the ray visibility Volume Scatter alone decides."""
+    stage.camera_above()
+    fog(stage, Color=(1, 1, 1, 1), Density=0.05)
+    lamp = stage.rectangle((3, -1), (4, 1), z=1.0, material=stage.material("ShaderNodeEmission", Strength=20.0))
+    lit = stage.render(1, (12, 12))["volume_direct"].mean()
+    lamp.visible_diffuse = False
+    assert stage.render(1, (12, 12))["volume_direct"].mean() == pytest.approx(lit, rel=1e-3)
+    lamp.visible_diffuse, lamp.visible_volume_scatter = True, False
+    assert lit > 0.01 and not stage.render(1, (12, 12))["volume_direct"].any()
