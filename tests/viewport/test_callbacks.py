@@ -64,6 +64,14 @@ class Window:
             assert gpu.state.blend_get() == "NONE"
         return images.read(self.target.colors[0])
 
+    def draw_sample(self, made):
+        """Redraw until samples are told of: programs that are not there yet come in one after the other."""
+        for _ in range(50):
+            pixels = self.draw(made)
+            if made.stats.startswith("Sample"):
+                break
+        return pixels
+
 
 @pytest.fixture
 def window(scene):
@@ -106,10 +114,7 @@ def test_error_is_told_once_and_ends_with_the_next_change(window, monkeypatch):
     assert len(made.reports) == 1 and made.redraws == asked
     monkeypatch.undo()
     window.update(made)
-    for _ in range(50):  # programs that are not there yet come in one after the other
-        window.draw(made)
-        if made.stats.startswith("Sample"):
-            break
+    window.draw_sample(made)
     assert made.stats.startswith("Sample")
 
 
@@ -157,7 +162,7 @@ def test_error_of_one_view_ends_with_another(window, monkeypatch):
     monkeypatch.undo()
     window.region_data.view_perspective, window.space_data.use_render_border = "PERSP", False
     window.space_data.clip_start, window.space_data.clip_end = 0.1, 100.0
-    window.draw(made)
+    window.draw_sample(made)
     assert made.stats.startswith("Sample")
 
 
