@@ -48,11 +48,21 @@ FIRST_LOOK = Program(
     ),
 )
 
+FINE = passes.fullscreen_program(
+    "first look guides",
+    "surface/first_look_guides.frag.glsl",
+    textures=(("RGBA16F", "guide"), ("RGBA16F", "look"), ("RGBA32F", "coarse")),
+    constants=(("FLOAT", "faint"),),
+    outputs=(("VEC4", "out_fine"),),
+)
+FAINT = 0.02  # radiance, by the exposure, that is as good as black where colours are compared
+
 
 class FirstLook:
     """Draws first looks, and keeps the last one."""
 
     def __init__(self):
+        self._fine: images.Target | None = None
         self._target: images.Target | None = None
         self._view: Block | None = None
         self._lamps: Block | None = None
@@ -101,8 +111,26 @@ class FirstLook:
                 passes.draw(shader, call.draw.batch, call.count)
         return self._target.colors[0]
 
+    def refined(self, coarse: images.Image, exposure: float) -> images.Image:
+        """A coarse picture of what was drawn last in the pixels of that: edges and shapes of the first look, and the
+        light of the picture."""
+        size = self._target.size
+        if self._fine is None or self._fine.size != size:
+            self._give_fine()
+            self._fine = images.Target((images.pool.take(*size, "RGBA16F"),))
+        textures = {"guide": self.guide, "look": self.picture, "coarse": coarse}
+        faint = FAINT / max(exposure, 1e-6)
+        passes.fullscreen(FINE, self._fine, textures=textures, constants={"faint": faint})
+        return self._fine.colors[0]
+
+    def _give_fine(self) -> None:
+        if self._fine is not None:
+            images.pool.give(self._fine.colors[0])
+            self._fine = None
+
     def release(self) -> None:
         """Give back the images."""
+        self._give_fine()
         if self._target is not None:
             for image in (*self._target.colors, self._target.depth):
                 images.pool.give(image)

@@ -71,6 +71,7 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         column.prop(settings, "noise_threshold")
         column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
+        column.prop(settings, "navigation")
         column.prop(settings, "seed")
 
 

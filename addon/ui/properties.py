@@ -147,6 +147,14 @@ def _annotations() -> dict:
             name="Denoise Viewport", default=True, update=_redraw,
             description="Filter the remaining noise of the viewport after its last sample",
         ),
+        "navigation": bpy.props.EnumProperty(
+            name="Navigation", default="10",
+            description="Pictures a second while the view or the scene changes: pixels are drawn as coarse as that "
+            "takes, but never fewer than 64 from top to bottom of the camera's frame",
+            items=(
+                ("10", "10 fps", "Finer pixels"), ("20", "20 fps", "Smoother"), ("30", "30 fps", "Smoothest"),
+            ),
+        ),
         "viewport_pause": bpy.props.BoolProperty(
             name="Pause Viewport", default=False, update=_redraw,
             description="Stop updating rendered viewports, so that the GPU is free for other work",

@@ -27,10 +27,22 @@ from ..snapshot import UnsupportedScene, camera_of_scene, camera_of_view, take
 from ..snapshot.errors import unforeseen
 from ..snapshot.scene import Camera, Snapshot
 from ..ui.properties import settings_of
-from .pace import SCALES, STEP_S, Pace
+from .pace import SCALES, STEP_S, STEP_SHARE, Pace, coarsest_for
 from .picture import BUDGET_S, MOST_BUDGET_S, REST_S, Viewport
 
-__all__ = ["BUDGET_S", "MOST_BUDGET_S", "REST_S", "SCALES", "STEP_S", "Pace", "Viewport", "changed", "draw", "free_all"]
+__all__ = [
+    "BUDGET_S",
+    "MOST_BUDGET_S",
+    "REST_S",
+    "SCALES",
+    "STEP_S",
+    "Pace",
+    "Viewport",
+    "changed",
+    "coarsest_for",
+    "draw",
+    "free_all",
+]
 
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
 
@@ -65,7 +77,8 @@ def draw(engine, context, depsgraph) -> None:
     """Draw the region: add samples, show the picture, and ask for another call until it is complete."""
     viewport = _viewport_of(engine, context, depsgraph)
     region, scene = context.region, depsgraph.scene
-    size = (max(region.width, 1), max(region.height, 1))
+    pixel = pixel_size(scene.render.preview_pixel_size)
+    size = (max(-(-region.width // pixel), 1), max(-(-region.height // pixel), 1))
     place = (size, context.region_data.view_perspective)
     if viewport.error and viewport.failed_at != place:  # it may have been this view's, or this size's
         viewport.error = ""
@@ -83,7 +96,7 @@ def draw(engine, context, depsgraph) -> None:
         else:
             engine.tag_redraw()  # a final render draws
     if viewport.picture is not None:
-        _show(engine, scene, viewport)
+        _show(engine, scene, viewport, (region.width / size[0], region.height / size[1]))
     engine.update_stats("Candela", viewport.status())
     if not viewport.done:
         engine.tag_redraw()
@@ -115,6 +128,8 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
     try:
         camera = camera_of_view(region_data, space, looks_through)
         border = render_border(depsgraph, space, camera, looks_through, size)
+        viewport.step = STEP_SHARE / float(depsgraph.scene.candela.navigation)
+        viewport.coarsest = coarsest_for(framed_height(depsgraph, camera, looks_through, size))
         viewport.draw_frame(
             source, camera, size, settings_of(depsgraph.scene, viewport=True, depsgraph=depsgraph), border=border
         )
@@ -163,6 +178,23 @@ def render_border(depsgraph, space, view: Camera, looks_through, size: tuple[int
     return int(x0), int(y0), int(max(edges[2], x0 + 1)), int(max(edges[3], y0 + 1))
 
 
+def framed_height(depsgraph, view: Camera, looks_through, size: tuple[int, int]) -> float:
+    """Pixels of the camera's frame from top to bottom; of a view of its own those of the region."""
+    if looks_through is None:
+        return float(size[1])
+    render = depsgraph.scene_eval.render
+    resolution = render.resolution_x, render.resolution_y
+    _, _, bottom, top = camera_of_scene(depsgraph.scene_eval, depsgraph, *resolution, looks_through).frame
+    return size[1] * (top - bottom) / (view.frame[3] - view.frame[2])
+
+
+def pixel_size(wanted: str) -> int:
+    """Screen pixels per side of a drawn one, as Blender's Pixel Size says for viewports."""
+    if wanted != "AUTO":
+        return int(wanted)
+    return 2 if bpy.context.preferences.system.pixel_size > 1.5 else 1
+
+
 def _fail(viewport: Viewport, engine, sentence: str) -> None:
     """Stop drawing until the scene changes; the sentence stands in the region, and once in Blender's reports."""
     viewport.drop()
@@ -171,14 +203,14 @@ def _fail(viewport: Viewport, engine, sentence: str) -> None:
     viewport.error = viewport.reported = sentence
 
 
-def _show(engine, scene, viewport: Viewport) -> None:
-    """Draw the picture over the region, with the scene's colour management."""
+def _show(engine, scene, viewport: Viewport, pixel: tuple[float, float]) -> None:
+    """Draw the picture over the region, with the scene's colour management. `pixel`: size of one on the screen."""
     from gpu_extras.presets import draw_texture_2d
 
-    x, y, width, height = viewport.place
+    x, y, width, height = (extent * pixel[k % 2] for k, extent in enumerate(viewport.place))
     gpu.state.blend_set("ALPHA_PREMULT")
     engine.bind_display_space_shader(scene)
-    draw_texture_2d(viewport.picture.texture, (x, y), width, height)
+    draw_texture_2d(viewport.shown.texture, (x, y), width, height)
     engine.unbind_display_space_shader()
     gpu.shader.unbind()
     gpu.state.blend_set("NONE")

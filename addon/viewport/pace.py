@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 STEP_S = 0.08  # what a step may take while the picture changes, to stay below 0.1 s: coarser pixels are drawn for it
+STEP_SHARE = 0.8  # of the time between two pictures that Candela's own work may take
 SCALES = (1, 2, 4, 8, 16)  # screen pixels per side of a drawn pixel; all but the first are drafts
 LONG_S = 1.5  # a sample in full resolution that takes no longer is waited for without finer drafts before it
 SHORT_S = 0.2  # of drafts that take no longer only the finest is drawn
@@ -50,6 +51,28 @@ class Pace:
         finer = [one for one in SCALES if 1 < one < scale]
         quick = (one for one in finer if (self.expected(one) or np.inf) <= SHORT_S)
         return next(quick, max(finer, default=1))
+
+
+GUIDE_SHARE = 0.35  # of a step, at most, that finding the shapes of a draft may take
+
+
+@dataclass
+class GuidePace:
+    """In which pixels the shapes of a draft are found, learned from what that took."""
+
+    by_pixel: float | None = None  # seconds
+
+    def learn(self, seconds: float, pixels: int) -> None:
+        """Take note of how long it took."""
+        now = seconds / max(pixels, 1)
+        self.by_pixel = now if self.by_pixel is None else 0.5 * (self.by_pixel + now)
+
+    def scale(self, pixels: int, draft: int, step: float) -> int | None:
+        """Screen pixels per side of one; None where not even half the draft's own scale is quick enough."""
+        if self.by_pixel is None:
+            return max(draft // 2, 1)
+        fitting = (one for one in SCALES if one < draft and self.by_pixel * pixels / one**2 <= GUIDE_SHARE * step)
+        return next(fitting, None)
 
 
 def coarsest_for(height: float, least: int = 64) -> int:

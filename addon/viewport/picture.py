@@ -24,7 +24,7 @@ from ..snapshot import SnapshotCache
 from ..snapshot.scene import Camera, Snapshot
 from ..surfaces.first_look import FirstLook
 from ..techniques.film import check_tree
-from .pace import SCALES, STEP_S, Pace
+from .pace import SCALES, STEP_S, GuidePace, Pace
 
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
@@ -58,7 +58,8 @@ class Viewport:
         self.cache = SnapshotCache()
         self.pace = Pace()
         self.bands = Bands()
-        self.look = FirstLook()
+        self.look, self.guide = FirstLook(), FirstLook()
+        self.guides = GuidePace()
         self.dirty = True  # the scene may have changed since the snapshot
         self.frame: Frame | None = None
         self.scale = SCALES[-2]
@@ -80,6 +81,7 @@ class Viewport:
         self._finished = False
         self._beginning: Beginning | None = None
         self._target: images.Target | None = None  # the picture, apart from the frame's images, which come and go
+        self._refined: images.Image | None = None  # a draft with the shapes of its guide
         self._shown_with: tuple = ()  # what the picture was shown with, see Frame.shown_with
         self._shown_place: tuple = ()  # from where, and in which pixels
         self._begun_for: tuple = ()  # the same of the frame
@@ -98,6 +100,11 @@ class Viewport:
         if self.looks:
             return self.look.picture
         return self._target.colors[0] if self._target else None
+
+    @property
+    def shown(self) -> images.Image | None:
+        """The same as it is drawn over the region: drafts with the shapes of what they show."""
+        return self.picture if self.looks or self._refined is None else self._refined
 
     @property
     def done(self) -> bool:
@@ -217,11 +224,33 @@ class Viewport:
             self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
         passes.copy(self.renderer.show(frame), self._target)
         self._shown_with, self.looks = frame.shown_with, False
+        self._refined = self._with_shapes(frame) if self.scale > 1 else None
         film = frame.snapshot.film
         x, y = self._size[0] / film.width, self._size[1] / film.height
         x0, y0, x1, y1 = film.border
         self.place = x0 * x, y0 * y, (x1 - x0) * x, (y1 - y0) * y
         self._shown_place = self._begun_for
+
+    def _with_shapes(self, frame: Frame) -> images.Image | None:
+        """The draft that is the picture, in finer pixels, if there is time for that."""
+        x0, y0, x1, y1 = self._begun_for[2]
+        pixels = (x1 - x0) * (y1 - y0)
+        scale = self.guides.scale(pixels, self.scale, self.step)
+        if scale is None:
+            return None
+        started, fresh = time.perf_counter(), library.news()
+        # The rectangle of the draft's own pixels, which begins and ends with whole ones.
+        film, finer = frame.snapshot.film, self.scale // scale
+        whole = replace(
+            film, width=film.width * finer, height=film.height * finer, border=tuple(finer * e for e in film.border)
+        )
+        view = View(frame.snapshot.camera, whole, self.renderer.geometry.origin)
+        self.guide.draw(self._snapshot, self.renderer.geometry, self.renderer.materials.compiled, view)
+        refined = self.guide.refined(self.picture, film.exposure)
+        images.finish()
+        if library.news() == fresh:
+            self.guides.learn(time.perf_counter() - started, pixels // scale**2)
+        return refined
 
     def _show_something(self, camera: Camera, size, border) -> None:
         """If the picture of this view is still to come, and what is shown is of another one: a first look at it."""
@@ -249,12 +278,13 @@ class Viewport:
 
     def _drop_look(self) -> None:
         self.look.release()
-        self._look_of, self.looks = (), False
+        self.guide.release()
+        self._look_of, self.looks, self._refined = (), False, None
 
     def _drop_picture(self) -> None:
         if self._target is not None:
             images.pool.give(self._target.colors[0])
-            self._target = None
+            self._target = self._refined = None
 
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Begin what is asked, at a fitting scale, if the frame is not of it."""

@@ -175,3 +175,14 @@ def test_what_the_region_hides_is_asked_for_and_starts_anew(window, monkeypatch)
         window.update(made)
         window.draw(made)
     assert asked[0] is None and asked[1] is not None
+
+
+def test_pixel_size_of_blender_is_followed(window):
+    window.scene.render.preview_pixel_size = "4"
+    made = Engine()
+    window.update(made)
+    window.draw(made)
+    (kept,) = viewport._viewports.values()
+    assert kept.shown.size == (SIZE[0] // 4, SIZE[1] // 4) or kept.scale > 1
+    assert kept.place == (0, 0, SIZE[0] // 4, SIZE[1] // 4)
+    assert viewport.pixel_size("AUTO") in (1, 2) and viewport.pixel_size("8") == 8

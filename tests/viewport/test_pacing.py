@@ -125,3 +125,54 @@ def test_view_that_is_redrawn_seldom_does_not_rest_between_two_changes(region):
         region.draw()
         region.clock.now += 1.5 * viewport.REST_S
     assert region.viewport.scale == 1
+
+
+@pytest.mark.parametrize(("height", "scale"), [(2000, 16), (1024, 16), (1000, 8), (300, 4), (100, 1), (20, 1)])
+def test_drafts_keep_64_pixels_from_top_to_bottom(height, scale):
+    assert viewport.coarsest_for(height) == scale
+
+
+def test_setting_of_navigation_and_the_floor_bound_the_scale():
+    pace = viewport.Pace({1: 2.0, 2: 0.5, 4: 0.07, 8: 0.02})
+    assert [pace.scale(step=0.8 / fps) for fps in (10, 20, 30)] == [4, 8, 8]
+    assert pace.scale(step=0.8 / 30, coarsest=2) == 2
+
+
+def test_picture_at_rest_becomes_finer_step_by_step_where_a_whole_sample_takes_long():
+    """Down to full resolution; drafts that are quick anyway are left out."""
+    assert viewport.Pace({8: 0.5}).finer(16) == 8
+    assert viewport.Pace({1: 20.0, 2: 5.0, 4: 1.2, 8: 0.3}).finer(8) == 4
+    assert viewport.Pace({1: 20.0, 2: 0.1, 8: 0.02}).finer(8) == 2
+    assert viewport.Pace({1: 20.0, 2: 0.1}).finer(2) == 1
+    assert viewport.Pace({1: 0.5, 8: 0.1}).finer(8) == 1
+
+
+def test_drafts_between_the_first_and_the_whole_picture_are_shown(region):
+    """At 1/8, 1/4, 1/2 and in full, each once, where nothing else is known."""
+    region.clock.tick = viewport.BUDGET_S / 8
+    region.viewport.pace.cost, seen = {8: 0.4, 4: 1.0, 2: 3.0, 1: 9.0}, []
+    for _ in range(400):
+        region.draw()
+        region.viewport.pace.cost = {8: 0.4, 4: 1.0, 2: 3.0, 1: 9.0}
+        if region.viewport.frame.samples_done and region.viewport.scale not in seen:
+            seen.append(region.viewport.scale)
+        if region.viewport.scale == 1 and region.viewport.frame.samples_done:
+            break
+    assert seen[-3:] == [4, 2, 1]
+
+
+def test_draft_has_the_shapes_of_the_surfaces_that_it_shows(region):
+    """A coarse picture, shown in finer pixels: nearer to the whole picture than by its own."""
+    whole = region.rest()[..., :3]
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.01}
+    region.viewport.guides.by_pixel = 0.0
+    region.camera = region.moved(1e-4)
+    region.draw()
+    assert region.viewport.scale == 8 and region.viewport.shown.size == SIZE
+
+    def error(picture):
+        pixels = images.read(picture)[..., :3]
+        fine = pixels.repeat(SIZE[1] // pixels.shape[0], 0).repeat(SIZE[0] // pixels.shape[1], 1)
+        return np.abs(fine - whole).mean()
+
+    assert error(region.viewport.shown) < 0.8 * error(region.viewport.picture)

@@ -1,0 +1,46 @@
+// A coarse picture in finer pixels, by what a first look at the same view knows of them: each takes the light of the
+// nearest coarse pixels that show the same surface, by its own colour and its own side towards the lamps.
+#define MOST_CHANGE 4.0
+#define SAME_DEPTH 0.05
+#define LEAST_WEIGHT 1e-4
+
+float likeness(vec4 here, vec4 there)
+{
+  if (here.w <= 0.0 || there.w <= 0.0) {
+    return here.w <= 0.0 && there.w <= 0.0 ? 1.0 : 0.0;
+  }
+  float apart = abs(here.w - there.w) / (SAME_DEPTH * max(here.w, there.w));
+  float turned = max(dot(here.xyz, there.xyz), 0.0);
+  turned *= turned;
+  return turned * turned / (1.0 + apart * apart);
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec2 fine = vec2(guide_size());
+  ivec2 size = coarse_size();
+  vec2 place = gl_FragCoord.xy / fine * vec2(size) - 0.5;
+  ivec2 corner = ivec2(floor(place));
+  vec2 part = place - vec2(corner);
+  vec4 guide_here = guide_fetch(pixel);
+  vec3 look_here = look_fetch(pixel).rgb + vec3(faint);
+  vec4 sum = vec4(0.0);
+  float weights = 0.0;
+  for (int k = 0; k < 4; k++) {
+    ivec2 step = ivec2(k & 1, k >> 1);
+    ivec2 texel = clamp(corner + step, ivec2(0), size - 1);
+    ivec2 middle = min(ivec2((vec2(texel) + 0.5) / vec2(size) * fine), ivec2(fine) - 1);
+    vec4 guide_there = guide_fetch(middle);
+    vec2 share = mix(1.0 - part, part, vec2(step));
+    float weight = share.x * share.y * (likeness(guide_here, guide_there) + LEAST_WEIGHT);
+    vec4 light = coarse_fetch(texel);
+    if (guide_here.w > 0.0 && guide_there.w > 0.0) {
+      vec3 change = look_here / (look_fetch(middle).rgb + vec3(faint));
+      light.rgb *= clamp(change, vec3(1.0 / MOST_CHANGE), vec3(MOST_CHANGE));
+    }
+    sum += weight * light;
+    weights += weight;
+  }
+  out_fine = sum / max(weights, 1e-20);
+}
