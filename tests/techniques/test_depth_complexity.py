@@ -384,3 +384,18 @@ def test_odd_casters_are_survived(by_edges):
     found = stage.render(size=(32, 32))["diffuse_direct"][..., 0]
     assert (found >= 0).all()
     assert found[16, 4] < 0.2 * found[16, 28]  # under the mirrored blocker
+
+
+@pytest.mark.parametrize("technique", ["depth_complexity", "penumbra_wedges"])
+def test_coloured_panes_whose_shadow_is_grey_are_named(stage, technique):
+    stage.scene.candela.slot_shadow = technique
+    stage.floor(2.0)
+    red = stage.material("ShaderNodeBsdfTransparent", Color=(1, 0.1, 0.1, 1))
+    pane = stage.blocker((-0.5, -0.5), (0.5, 0.5), 1.0, material=red)
+    stage.light("AREA", (0, 0, 3), size=0.5)
+    stage.camera_above(2.0)
+    stage.render(1, (12, 12))
+    assert any("is grey" in note.text and note.material == red.name for note in stage.ledger.notes)
+    pane.data.materials[0] = stage.see_through(0.5)
+    stage.render(1, (12, 12))
+    assert not any("is grey" in note.text for note in stage.ledger.notes)
