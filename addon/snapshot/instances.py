@@ -18,6 +18,7 @@ from operator import and_
 import bpy
 import numpy as np
 
+from .bound_points import bound
 from .cache import SnapshotCache
 from .hair import HairSystem, hair_systems
 from .own_settings import Own, own_settings
@@ -161,7 +162,7 @@ def walk(
                         random=_random_of_name(original.name),
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
-                        own=own_settings(owner),
+                        own=bound(own_settings(owner), owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         smoke=domain_of(owner) is not None,
                         shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),

@@ -31,6 +31,7 @@ EDITS = Struct(
     ("vec4", f"region[{2 * MOST_REGIONS}]"),
     ("vec4", f"pair[{3 * MOST_CONSTRAINTS}]"),
     ("vec4", "frozen"),  # the eye of the view that stays, and 1
+    ("vec4", "shape"),  # whether the object is closed
 )
 SOLVE_CONSTANTS = (("INT", "region_count"), ("INT", "constraint_count"), ("FLOAT", "distance_floor"))
 SOLVE = passes.fullscreen_program(
@@ -106,8 +107,10 @@ def edit_table(
     members: Sequence[int],
     extent: float,
     frozen: np.ndarray | None = None,
+    closed: bool = False,
 ) -> EditTable:
-    """`members`: for each region the bits of its constraints. `extent` of the object, m. `frozen`: an eye (3,)."""
+    """`members`: for each region the bits of its constraints. `extent` of the object, m. `frozen`: an eye (3,).
+    `closed`: rays that edits send into the object go on where they leave it."""
     region = np.zeros((2 * MOST_REGIONS, 4), np.float32)
     pair = np.zeros((3 * MOST_CONSTRAINTS, 4), np.float32)
     for k, (one, bits) in enumerate(zip(regions, members)):
@@ -122,7 +125,9 @@ def edit_table(
         "region_count": len(regions), "constraint_count": len(constraints),
         "distance_floor": max(FLOOR * extent, 1e-30),
     }  # fmt: skip
-    return EditTable(Block(EDITS, region=region, pair=pair, frozen=eye), constants)
+    return EditTable(
+        Block(EDITS, region=region, pair=pair, frozen=eye, shape=(float(closed), 0.0, 0.0, 0.0)), constants
+    )
 
 
 def _decided(one: Constraint) -> np.ndarray:

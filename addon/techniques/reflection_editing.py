@@ -14,9 +14,9 @@ never change, and pixels outside of all regions are what they are without this t
 | geodesic distances, once per change | a shortest-path search per region and constraint, as far as regions reach |
 
 Bias: directions are exact for the view in which a constraint was made; in other views they turn along with what the
-surface mirrors there. Surfaces that are seen in a mirror or through glass are shown without their edits. An edited
-direction that points into a solid shows its inside. Edits of more than 120 degrees fold over: the ledger tells the
-largest one. Drafts show glass without its edits.
+surface mirrors there. Surfaces that are seen in a mirror or through glass are shown without their edits. A mirrored ray
+that an edit sends into its own closed object begins where it leaves that. Edits of more than 120 degrees fold over: the
+ledger tells the largest one. Drafts show glass without its edits.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from ..frame.settings import Settings
 from ..frame.technique import OBJECT, POINT, Param, Technique, Write, own_value
 from ..gfx import geometry, images, passes
 from ..gfx.library import Program
+from ..scene.culling import closed
 from ..scene.materials import CAMERA_DEFINES, SURFACE_IMAGES
 from ..scene.view import VIEW
 from ..snapshot.scene import Instance, Mesh, Snapshot
@@ -264,7 +265,7 @@ def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geode
     if own_value(instance.own, ReflectionEditing, "freeze"):
         frozen = _moved(matrix, wanted_constraints[0]["viewer"])
     extent = float(np.linalg.norm(np.ptp(world, axis=0)))
-    table = reflection_edits.edit_table(found, regions, members, extent, frozen)
+    table = reflection_edits.edit_table(found, regions, members, extent, frozen, _is_closed(mesh))
     count = -(-len(layers) // 4)
     packed = np.zeros((len(world), 4 * count), np.float32)
     for k, layer in enumerate(layers):
@@ -283,10 +284,9 @@ def _moved(matrix: np.ndarray, point) -> np.ndarray:
 def _constraint(frame: Frame, instance, mesh: Mesh, matrix, surface: geodesic.Surface, one: dict) -> Constraint:
     point = _moved(matrix, one["point"])
     triangle, weights = one["triangle"], np.asarray(one["weights"], float)
-    if 0 <= triangle < len(surface.triangles):
-        point = weights @ surface.positions[surface.triangles[triangle]]
-    else:
+    if not 0 <= triangle < len(surface.triangles):
         triangle, weights = surface.nearest(point)
+    point = weights @ surface.positions[surface.triangles[triangle]]
     cofactors = np.linalg.det(matrix[:3, :3]) * np.linalg.pinv(matrix[:3, :3]).T
     normal = reflection_edits.unit(cofactors @ (weights @ mesh.corner_normals[mesh.triangle_corners[triangle]]))
     view = reflection_edits.unit(_moved(matrix, one["viewer"]) - point)
@@ -300,6 +300,16 @@ def _constraint(frame: Frame, instance, mesh: Mesh, matrix, surface: geodesic.Su
     after = _moved(matrix, one["target"]) - point
     after = reflection_edits.unit(after) if np.linalg.norm(after) > 0 else before
     return Constraint(point, before, after, normal, bends)
+
+
+def _is_closed(mesh: Mesh) -> bool:
+    """Whether the mesh bounds a solid, whichever way it is wound, with vertices at one place (to a millionth of its size)
+    taken for one: those of seams and poles."""
+    step = max(float(np.ptp(mesh.positions, axis=0).max()), 1e-30) / 2**20
+    places, number = np.unique(np.round(mesh.positions / step), axis=0, return_inverse=True)
+    triangles = number.reshape(-1)[mesh.corner_vertices[mesh.triangle_corners]]
+    triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+    return closed(places, triangles) or closed(places, triangles[:, ::-1])
 
 
 def _painted(mesh: Mesh) -> np.ndarray:

@@ -7,6 +7,7 @@ import math
 import bpy
 from bpy_extras import view3d_utils
 from mathutils import Vector
+from mathutils.interpolate import poly_3d_calc
 
 from ..techniques.reflection_editing import ReflectionEditing
 from . import ENGINE
@@ -49,10 +50,27 @@ def nearest(edited, place: Vector) -> tuple[Vector, Vector] | None:
     """Point of an object's surface that is nearest to a place, and the normal there, all in its own space. None where
     Blender keeps no surface to ask: without faces, in Edit Mode, and while the object is disabled in viewports."""
     try:
-        found, point, normal, _ = edited.closest_point_on_mesh(place)
+        found, point, normal, face = edited.closest_point_on_mesh(place)
     except RuntimeError:
         return None
-    return (point, normal) if found else None
+    return (point, shading_normal(evaluated_mesh(edited), face, point, normal)) if found else None
+
+
+def evaluated_mesh(edited):
+    """What the viewport shows of an object; None where it shows no mesh."""
+    data = edited.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    return data if isinstance(data, bpy.types.Mesh) else None
+
+
+def shading_normal(mesh, face: int, point: Vector, flat: Vector) -> Vector:
+    """The normal that reflections have at a point of a face: between those of its corners, on the side of `flat`."""
+    if mesh is None or not 0 <= face < len(mesh.polygons):
+        return flat
+    corners = [*mesh.polygons[face].loop_indices]
+    places = [mesh.vertices[mesh.loops[k].vertex_index].co for k in corners]
+    weights = poly_3d_calc(places, point)
+    normal = sum((w * mesh.corner_normals[k].vector for w, k in zip(weights, corners)), Vector())
+    return normal.normalized() if normal.dot(flat) > 0.0 else flat
 
 
 def angle_of(entry, edited) -> float | None:
@@ -150,7 +168,7 @@ class CANDELA_OT_pick_reflection(_OfAnObject, bpy.types.Operator):
         start = view3d_utils.region_2d_to_origin_3d(region, view, place_on_region)
         direction = view3d_utils.region_2d_to_vector_3d(region, view, place_on_region)
         graph = context.evaluated_depsgraph_get()
-        hit, point, normal, _, met, _ = context.scene.ray_cast(graph, start, direction)
+        hit, point, normal, face, met, matrix = context.scene.ray_cast(graph, start, direction)
         try:
             edited = clicked(context.view_layer, met if hit else None)
         except ValueError as error:
@@ -160,6 +178,10 @@ class CANDELA_OT_pick_reflection(_OfAnObject, bpy.types.Operator):
             other.select_set(False)
         edited.select_set(True)
         context.view_layer.objects.active = edited
+        inverse = matrix.inverted_safe()
+        flat = (matrix.to_3x3().transposed() @ normal).normalized()
+        smooth = shading_normal(evaluated_mesh(edited), face, inverse @ point, flat)
+        normal = (inverse.to_3x3().transposed() @ smooth).normalized()
         normal = normal if normal.dot(direction) < 0 else -normal
         place(context, edited, point, normal, start)
         return {"FINISHED"}

@@ -37,5 +37,6 @@ void main()
   if (dot(q, q) == 0.0) {
     discard;
   }
-  out_edit = (edits.frozen.w > 0.5) ? quaternion_product(q, quaternion_between(r, meant)) : q;
+  q = (edits.frozen.w > 0.5) ? quaternion_product(q, quaternion_between(r, meant)) : q;
+  out_edit = normalize(q) * ((edits.shape.x > 0.5) ? 2.0 : 1.0);  // as surface_edited of lib/gbuffer.glsl takes it
 }

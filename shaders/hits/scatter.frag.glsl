@@ -80,6 +80,9 @@ void main()
   vec3 side = ((code & PATH_BENT) != 0) ? -s.geometric_normal : side_of_ray(s, direction);
   side = (dot(side, direction) < 0.0 && surface_is_edited(s)) ? -side : side;
   out_origin = vec4(ray_origin(s.position, side), width);
+  if ((code & PATH_BENT) == 0 && enters_itself(s, direction)) {
+    out_origin.w = -width;
+  }
   out_direction = vec4(direction, density);
   out_path = vec4(throughput, float(code));
 }

@@ -10,6 +10,7 @@
 //
 // Depth: as it was, 0, where there is no ray, as is all else there; 0.5 where one meets nothing, above where one does, by program.
 #include "trace/hierarchy.glsl"
+#include "trace/own_solid.glsl"
 #include "hits/shared.glsl"
 #ifdef ABSORBING
 #include "trace/solid.glsl"
@@ -36,6 +37,9 @@ void main()
   vec4 start = ray_origin_fetch(pixel);
   gl_FragDepth = 0.5;
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 61 + ray_number);
+  if (start.w < 0.0) {
+    start = vec4(beyond_solid(start.xyz, direction, roll.x), -start.w);
+  }
   ivec2 hit;
   float t = trace_layers(start.xyz, direction, 1e29, 0.0, roll.x, glass_bends != 0, false, hit);
   if (t >= 1e29) {

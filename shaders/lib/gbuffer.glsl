@@ -42,6 +42,7 @@ struct Surface {
   int distribution;       // of the lobe's microfacets: DISTRIBUTION_*
 #ifdef HAS_SURFACE_EDIT
   vec4 edit;              // quaternion that turns its frame (edit/); 0: none
+  bool edit_solid;        // whether the edited object is closed
 #endif
 };
 
@@ -233,14 +234,18 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   s.sink = (s.kind == LOBE_TRANSLUCENT) ? emission.w : 0.0;
 #ifdef HAS_SURFACE_EDIT
   s.edit = vec4(0.0);
+  s.edit_solid = false;
 #endif
   return s;
 }
 
 #ifdef HAS_SURFACE_EDIT
+// `edit`: a quaternion, of length 2 where it is that of a closed object; 0: none.
 Surface surface_edited(Surface s, vec4 edit)
 {
-  s.edit = edit;
+  float size = length(edit);
+  s.edit = (size > 0.0) ? edit / size : vec4(0.0);
+  s.edit_solid = size > 1.5;
   return s;
 }
 #endif
@@ -258,6 +263,16 @@ bool surface_is_edited(Surface s)
 bool may_mirror(Surface s, vec3 direction)
 {
   return dot(direction, s.geometric_normal) > 0.0 || surface_is_edited(s);
+}
+
+// Whether an edit sends a mirrored ray into the object itself. It shows its surroundings then: rays begin where they leave it.
+bool enters_itself(Surface s, vec3 direction)
+{
+#ifdef HAS_SURFACE_EDIT
+  return s.edit_solid && dot(direction, s.geometric_normal) < 0.0;
+#else
+  return false;
+#endif
 }
 
 // The side of the triangle on which a ray along `direction` starts: edits may turn it below.

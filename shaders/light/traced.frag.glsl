@@ -5,6 +5,7 @@
 #include "lib/brdf.glsl"
 #include "lib/environment.glsl"
 #include "light/sources.glsl"
+#include "trace/own_solid.glsl"
 #include "trace/rays.glsl"
 
 #ifdef MEDIA
@@ -107,6 +108,9 @@ void main()
   ivec2 hit;
   if (kept_importance > 0.0) {
     origin = ray_origin(s.position, side_of_ray(s, kept_direction));
+    if (enters_itself(s, kept_direction)) {
+      origin = beyond_solid(origin, kept_direction, layers);
+    }
     // Whatever stands before the nearest source blocks all of them.
     // What is behind glass that bends is left to the rays of hits/, where these follow the lobe.
     bool glass_stops = glass_bends != 0 && s.glossy_roughness <= shaded_roughness;

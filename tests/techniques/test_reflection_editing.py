@@ -2,11 +2,14 @@
 
 import time
 
+import bpy
 import numpy as np
 import pytest
 
 from addon import engine
 from addon.gfx import images, passes
+from addon.snapshot.bound_points import bound
+from addon.snapshot.own_settings import own_settings
 from addon.surfaces import geodesic, reflection_edits
 from addon.surfaces.reflection_edits import EUCLIDEAN, MOST_LAYERS, SOLVE, Constraint, Region, edit_table, mirrored
 from bench.reflection_costs import torus
@@ -584,3 +587,33 @@ def test_an_edit_of_glass_follows_its_index(stage):
     engine.free_sessions()
     assert np.array_equal(second, stage.render(1, bounces=2)["combined"])
     assert not np.array_equal(first, second)
+
+
+@pytest.mark.parametrize("degrees", [15, 60])
+def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees):
+    """Edited rays that point into the ball show what is behind it, not its inside."""
+    ball = sphere(stage, stage.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)), rings=24)
+    stage.world((1, 1, 1), 1.0)
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
+    after = about((0, 0, 1), degrees) @ np.array([0.0, -1.0, 0.0])
+    constrain(ball, (0, -1, 0), tuple(np.array([0, -1, 0]) + 5 * after), (0, -4, 0))
+    found = stage.render(2, (48, 48), bounces=2)["combined"][..., :3]
+    assert found.mean() == pytest.approx(1.0, abs=2e-3) and found.min() > 0.9
+
+
+def test_a_constraint_follows_a_shape_key(stage):
+    """Without a triangle it belongs to a place of the undeformed mesh: a ball that is moved takes it along."""
+    ball = sphere(stage, stage.principled(Metallic=1.0, Roughness=0.0), rings=16)
+    constrain(ball, (0, -1, 0), (0, -5, 1), (0, -4, 0))
+    ball.shape_key_add(name="Basis")
+    key = ball.shape_key_add(name="Grown")
+    for one in key.data:
+        one.co = (one.co.x, one.co.y + 0.5 * one.co.x + 2.0, one.co.z)
+    bpy.context.view_layer.update()
+    places = []
+    for value in (0.0, 1.0):
+        key.value = value
+        bpy.context.view_layer.update()
+        own = bound(own_settings(ball), ball.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+        places.append(dict(dict(own)["reflection_editing_constraints"][0])["point"])
+    assert places[0] == pytest.approx((0, -1, 0)) and places[1] == pytest.approx((0, 1, 0), abs=0.02)

@@ -68,6 +68,18 @@ def test_on_a_surface_a_constraint_is_placed_and_its_angle_shown(mirror):
     assert labels(mirror) == ["Turns reflections by 0°"]
 
 
+def test_a_new_constraint_on_a_coarse_smooth_mesh_turns_nothing(mirror):
+    """Reflections follow the normals between those of corners, not those of faces, which differ by up to 15 degrees."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8, location=(1, 2, 0.3), rotation=(0.4, 0.2, 0.1))
+    ball = bpy.context.object
+    ball.data.shade_smooth()
+    bpy.context.view_layer.update()
+    for where in ((1.4, 1.2, 0.6), (0.8, 1.1, 0.2), (1.0, 1.3, 1.0)):
+        assert bpy.ops.candela.place_reflection(location=where, viewer=(0, -4, 1)) == {"FINISHED"}
+        entry = ball.candela.reflection_editing_constraints[-1]
+        assert reflection_operators.angle_of(entry, ball) < 0.004
+
+
 @pytest.mark.parametrize("change", CASES)
 def test_without_a_surface_no_angle_is_shown(mirror, change):
     change(mirror)
