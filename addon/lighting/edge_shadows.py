@@ -27,7 +27,9 @@ from ..snapshot.scene import Note, Snapshot
 from ..sources import lights
 from ..surfaces.draw import SURFACES
 from . import edge_tiles, repeated_light, silhouettes
+from .caustic_casters import glass_alone
 from .edge_tiles import EdgeTiles, Lit
+from .loop import tinted_casters
 from .point_maps import PointMaps
 from .silhouettes import Extent, Silhouettes
 from .textured_volumes import CARD_WORDS, CardCache
@@ -127,6 +129,8 @@ class EdgeShadows(PointMaps):
             return "lights without shadow", None
         if not emitter.extended:
             return "lights without extent", None
+        if tinted_casters(frame, glass_alone(frame)):  # what edges find is a share of the light, without colour
+            return "lights that coloured panes tint: rays or maps", None
         nearest = edge_tiles.nearest_receiver(frame, emitter)
         if emitter.kind in (lights.POINT, lights.SPHERE) and emitter.radius > NEAR * nearest:
             return "round lights that are near: rays or maps", None

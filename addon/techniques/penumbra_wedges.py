@@ -53,6 +53,7 @@ GROUPS = 48  # four images of four channels of three digits of base 256, which f
 BIAS = 96  # layers that a digit may fall short by, so that 159 may lie before a light
 SQUARE_OF_DISC = np.sqrt(np.pi) / 2  # half a square's side, by the radius of a disc as large
 FEW_BORDERS = 0.15  # share of the edges of a body that may be borders
+FLAT = 0.25  # length of the sum of directed areas over the sum of areas, from which on an open mesh is a sheet
 CARD_POINTS = 64
 BOXES, PRODUCT, SUM = "BOXES", "PRODUCT", "SUM"
 UNIONS = (
@@ -250,8 +251,17 @@ class PenumbraWedges(EdgeShadows):
 
 def triangles_of_a_layer(casters: CasterEdges) -> np.ndarray:
     """(G,) how many triangles a line through a group crosses where it hides something once: 2 of a body, 1 of a sheet.
-    A body with a few holes is no sheet."""
+
+    A body with a few holes is no sheet. However finely an open sheet is meshed, so that few edges are borders, its
+    directed areas add up, where those of a body cancel but for its holes.
+    """
     count = len(casters.closed)
     edges = np.bincount(casters.group, minlength=count)
     borders = np.bincount(casters.group[casters.faces[:, 1] < 0], minlength=count)
-    return np.where(borders <= FEW_BORDERS * edges, 2.0, 1.0)
+    corners = casters.corners.astype(np.float64)
+    directed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = np.stack([np.bincount(casters.triangle_group, directed[:, axis], count) for axis in range(3)], axis=1)
+    whole = np.bincount(casters.triangle_group, np.linalg.norm(directed, axis=1), count)
+    is_flat = np.linalg.norm(total, axis=1) > FLAT * whole
+    is_sheet = (borders > FEW_BORDERS * edges) | ((borders > 0) & is_flat)
+    return np.where(is_sheet, 1.0, 2.0)

@@ -303,8 +303,8 @@ def _constraint(frame: Frame, instance, mesh: Mesh, matrix, surface: geodesic.Su
 
 
 def _is_closed(mesh: Mesh) -> bool:
-    """Whether the mesh bounds a solid, whichever way it is wound, with vertices at one place (to a millionth of its size)
-    taken for one: those of seams and poles."""
+    """Whether the mesh bounds a solid, whichever way it is wound. Vertices at one place (to a millionth of its size)
+    are taken for one: those of seams and poles."""
     step = max(float(np.ptp(mesh.positions, axis=0).max()), 1e-30) / 2**20
     places, number = np.unique(np.round(mesh.positions / step), axis=0, return_inverse=True)
     triangles = number.reshape(-1)[mesh.corner_vertices[mesh.triangle_corners]]

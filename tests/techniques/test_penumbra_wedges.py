@@ -250,6 +250,31 @@ def test_a_body_of_many_layers_hides_the_light(by_wedges):
     assert found[2:4, 2:4].min() > 0.98
 
 
+def test_a_finely_meshed_sheet_is_no_body(by_wedges):
+    """Of a sheet of 30 x 30 squares 6 % of the edges are borders; it hides the lamp all the same, once."""
+    stage = by_wedges
+    stage.floor()
+    side = np.linspace(-1.0, 1.0, 31)
+    corners = [(x, y, 2.0 + 0.1 * np.sin(3 * x)) for x in side for y in side]
+    faces = [(31 * j + k, 31 * j + k + 1, 31 * j + k + 32, 31 * j + k + 31) for j in range(30) for k in range(30)]
+    stage.mesh(corners, faces).visible_camera = False
+    square(stage, size=0.5)
+    stage.camera_above(span=1.0)
+    assert share(stage, (16, 16)).max() < 0.01
+
+
+def test_lights_through_coloured_panes_have_maps(by_wedges):
+    """A share of the light has no colour, so that shadows of edges would be grey."""
+    stage = by_wedges
+    stage.floor()
+    stage.blocker((-1, -1), (1, 1), 2.0, material=stage.material("ShaderNodeBsdfTransparent", Color=(0.9, 0.2, 0.1, 1)))
+    square(stage)
+    stage.camera_above(span=1.0)
+    red, _, blue = stage.render(16, (8, 8))["diffuse_direct"].mean(axis=(0, 1))
+    assert row(stage).counters["lights that coloured panes tint: rays or maps"] == 1
+    assert blue / red == pytest.approx(0.1 / 0.9, rel=0.3)  # what passes a pane is drawn by chance; grey would be 1
+
+
 def test_lights_before_too_many_cards_have_maps(by_wedges, monkeypatch):
     stage = by_wedges
     stage.floor()
