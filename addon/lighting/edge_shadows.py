@@ -23,7 +23,7 @@ from ..gfx.library import Program
 from ..sampling import sequence
 from ..scene import edges
 from ..scene.edges import CasterEdges, EdgeCache
-from ..snapshot.scene import Note, Snapshot
+from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..surfaces.draw import SURFACES
 from . import edge_tiles, repeated_light, silhouettes
@@ -33,7 +33,7 @@ from .loop import tinted_casters
 from .point_maps import PointMaps
 from .silhouettes import Extent, Silhouettes
 from .textured_volumes import CARD_WORDS, CardCache
-from .visibility import Lookup, Maps, VisibilityProvider, drawn_stochastically, has_extent
+from .visibility import Lookup, Maps, VisibilityProvider, has_extent
 
 NEAR = 0.25  # radius / distance of a round light from which rays take over, as direct_light has it
 PATTERNS = 16  # of neighbouring pixels, four by four
@@ -100,14 +100,6 @@ class EdgeShadows(PointMaps):
         if len(self._served) < len(frame.emitters):
             self.fallback.begin(frame)
             frame.provide(self, VisibilityProvider)
-        panes = (frame.materials.compiled[draw.material] for draw in drawn_stochastically(frame))
-        tinted = sorted({material.name for material in panes if material.tinted and not material.glass})
-        if self._served and tinted:
-            text = (
-                f"edges know shares of light and no colours, so what passes '{tinted[0]}' is grey: choose Accumulated "
-                "shadow maps in the Shadow slot."
-            )
-            frame.ledger.notes = (*frame.ledger.notes, Note(self.label, text, tinted[0]))
 
     def find_casters(self, frame: Frame) -> None:
         """What `suits` asks; no light is served yet."""
