@@ -4,10 +4,10 @@ A material is a caster if it bends light (glass, of any roughness) or mirrors it
 (Glossy, Metallic, or Principled with metallic from METALLIC on) and is smooth: roughness up to SMOOTH, known from the
 socket's own value. What a varnish over a diffuse surface mirrors stays with indirect light.
 
-A light is answered for if it casts shadows, diffuse surfaces see it, and from the casters it looks at most WIDEST wide;
-the caustic of a wider one differs little from its straight shadow. Shadow rays of the lights answered for take glass as
-opaque: what passes it arrives as photons. All glass counts there, so a pane beside a lens is a caster, too. A scene in
-which all glass is flat panes and nothing else throws caustics is left to straight light, which is right for panes.
+A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. Shadow rays of the lights
+answered for take glass as opaque: what passes it arrives as photons. All glass counts there, so a pane beside a lens is
+a caster, too. A scene in which all glass is flat panes and nothing else throws caustics is left to straight light,
+as is right for panes.
 
 Blender's switches: with Reflective or Refractive caustics off (Cycles' Light Paths), reflected or refracted light is
 left out, but for glass with Shadow Caustics: objects set to cast them, under lights set to give them. Where the Cycles
@@ -26,14 +26,13 @@ from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.picture import Frame
 from ..materials.compiler import may_emit, may_refract
 from ..materials.graph import Graph, Node
-from ..snapshot.scene import Instance, Light, Mesh, Snapshot
+from ..snapshot.scene import Instance, Mesh, Snapshot
 from ..sources import lights
 from .light_views import groups
 
 SLOT = "caustics"
 SMOOTH = 0.25  # roughness
 METALLIC = 0.5
-WIDEST = 0.6  # tangent of half the angle of a light, seen from the casters
 MARGIN = 0.02  # of a caster's box, for what its float32 bounds miss
 FLAT = 0.999  # cosine between normals of a pane's faces
 _CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHoldout", "ShaderNodeBsdfRayPortal")
@@ -111,11 +110,8 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
         return "no lamp that casts shadows lights them: light of the world and of meshes passes straight"
     boxes = np.array([_box(one, snapshot.meshes[one.mesh]) for one in shown])
     low, high = groups(*grown(boxes[:, 0], boxes[:, 1]))
-    answered = [light for light in given if _width(light, low, high) <= WIDEST]
-    if not answered:
-        return "all lamps are so wide, seen from what would throw caustics, that these look like straight light"
-    keys = frozenset(light.key for light in answered)
-    bent = frozenset(light.key for light in answered if light.caustics) if by_flags else keys
+    keys = frozenset(light.key for light in given)
+    bent = frozenset(light.key for light in given if light.caustics) if by_flags else keys
     return Casters(frozenset(glass), mirrors, low, high, keys, bent)
 
 
@@ -176,21 +172,6 @@ def grown(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Boxes with a margin. They are grown before they are grouped, so that no photon is in two groups."""
     pad = MARGIN * (high - low) + 1e-5 * np.linalg.norm(high.max(axis=0) - low.min(axis=0))
     return low - pad, high + pad
-
-
-def _width(light: Light, low: np.ndarray, high: np.ndarray) -> float:
-    """Tangent of half the light's angle, seen from the nearest of the casters' boxes."""
-    if light.kind == "SUN":
-        return float(np.tan(min(light.angle / 2, 1.5)))
-    scale = np.linalg.norm(light.matrix[:3, :3], axis=0)
-    if light.kind == "AREA":
-        reach = float(np.hypot(light.size[0] * scale[0], light.size[1] * scale[1])) / 2
-    else:
-        reach = light.radius
-    gap = np.linalg.norm(np.clip(light.matrix[:3, 3], low, high) - light.matrix[:3, 3], axis=1)
-    middle = np.linalg.norm((low + high) / 2 - light.matrix[:3, 3], axis=1)
-    # Beside a caster a lamp is wide, but so it is for all that is near: the middle counts.
-    return float(reach / max(np.maximum(gap, 0.5 * middle).min(), 1e-30))
 
 
 def _is_pane(mesh: Mesh) -> bool:

@@ -1,9 +1,10 @@
-"""How materials bend and mirror what meets them where no shader of theirs can run: means, three texels a material.
+"""How materials bend and mirror what meets them where no shader of theirs can run: means, texels of a row a material.
 
 0  colour of what passes glass, once; index of refraction
 1  roughness; share of the material that is glass; losses at the interface (0 none but total reflection, 1
    Fresnel's, 2 with multiple scattering given back); whether what is mirrored has the colour, too
 2  what the inside absorbs, 1/m; whether the material is a mirror that passes photons on
+3  and on, two by two as 0 and 1: interfaces that the material has beside (several Glass nodes); share 0: none
 """
 
 from __future__ import annotations
@@ -15,18 +16,19 @@ import numpy as np
 from ..frame.picture import Frame
 from ..gfx import images
 from ..materials.compiled import CompiledMaterial
+from ..materials.estimate import Interface
 from ..surfaces.hits import defines_of_absorption
 
 
 def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, float] | None = None) -> np.ndarray:
-    """(N, 3, 4) float32 rows of the materials; `mirrors`: roughness of those that mirror photons."""
-    table = np.zeros((len(compiled), 3, 4), np.float32)
+    """(N, 3 + 2 K, 4) float32 rows of the materials, K the most interfaces that one has beside its first; `mirrors`:
+    roughness of those that mirror photons."""
+    table = np.zeros((len(compiled), 3 + 2 * (most_interfaces(compiled) - 1), 4), np.float32)
     for number, (row, material) in enumerate(zip(table, compiled)):
-        if material.glass:
-            glass = material.glass
-            row[0] = *glass.color, glass.ior
+        for place, glass in zip((0, *range(3, row.shape[0], 2)), _interfaces(material)):
             losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
-            row[1] = glass.roughness, glass.share, losses, glass.mirrors_color
+            row[place] = *glass.color, glass.ior
+            row[place + 1] = glass.roughness, glass.share, losses, glass.mirrors_color
         if material.medium:
             row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
         if mirrors and number in mirrors:
@@ -34,6 +36,15 @@ def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, flo
             if not material.glass:
                 row[1, 0] = mirrors[number]
     return table
+
+
+def most_interfaces(compiled: Sequence[CompiledMaterial]) -> int:
+    """How many interfaces a material has at most, at least 1."""
+    return max((len(_interfaces(material)) for material in compiled), default=1) or 1
+
+
+def _interfaces(material: CompiledMaterial) -> tuple[Interface, ...]:
+    return (material.glass, *material.glass.others) if material.glass else ()
 
 
 def upload_interfaces(compiled: Sequence[CompiledMaterial], mirrors: dict[int, float] | None = None) -> images.Image:

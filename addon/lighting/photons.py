@@ -46,7 +46,7 @@ from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
-from .interfaces import upload_interfaces
+from .interfaces import most_interfaces, upload_interfaces
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
 from .media import dimmed, is_endless
 
@@ -93,7 +93,11 @@ FOOTPRINTS = passes.fullscreen_program(
 )
 WIDENING = 1.25  # of footprints beside the way to the neighbours: the least that leaves no gaps (docs/caustics.md)
 FALL_KNOWN, FALL_GROWING = -1.0 / 5.0, -1.0 / 5.0  # exponents of the footprints' fall with samples
+FEW = 16  # samples of a light, below which each has several of its points, and of the lobes of one material all
 VIEWS = 4  # of lights and casters in a sample, in the mean, where lights may take turns
+WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
+MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
+LEAST_SIDE = 48
 LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
 
 
@@ -105,9 +109,9 @@ class LitView:
     sample: np.ndarray  # the point of the light that it looks from
     view: LightView
     lobes: tuple[int, ...]  # that photons may take there
-    index: int  # how many samples had photons of this light before
-    count: int  # how many samples of the picture have, or have had up to now
-    weight: float  # of the sample's photons: they stand for the samples that have none
+    index: int  # how many points of this light have had photons before
+    count: int  # how many points of it the picture has, or has had up to now
+    weight: float  # of the point's photons: they stand for the samples that have none
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,17 @@ class Bundle:
     count: int  # of samples that share the light
 
 
+def _points(emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]], count: int) -> int:
+    """How many points of a light photons of one sample come from: several of a wide one where samples are few."""
+    if emitter.kind == lights.SUN:
+        width = float(np.tan(min(emitter.radius, 1.5)))
+    else:
+        place = emitter.position(emitter.middle())
+        far = [np.linalg.norm((low + high) / 2 - place) for low, high in boxes]
+        width = emitter.reach / max(min(far, default=np.inf), 1e-30)
+    return int(np.clip(FEW // max(count, 1), 1, MOST_POINTS)) if width > WIDE else 1
+
+
 class Photons:
     """Finds the photons of each sample. A technique owns one."""
 
@@ -127,6 +142,7 @@ class Photons:
         self._sources = lights.Sources()
         self._interfaces: images.Image | None = None
         self._emission: Block | None = None
+        self._parts = 1
         self._found: images.Target | None = None
         self._footprints: images.Target | None = None
 
@@ -134,6 +150,7 @@ class Photons:
         """Before the first sample of a frame."""
         frame.kept(Reflectance).update(frame)
         self._interfaces = upload_interfaces(frame.materials.compiled, casters.mirrors)
+        self._parts = most_interfaces([frame.materials.compiled[k] for k in casters.refracting])
         inner = [frame.materials.compiled[k].medium for k in casters.refracting]
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
         self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
@@ -145,11 +162,16 @@ class Photons:
         for emitter, index, count, weight in self._turns(frame, casters):
             bends = casters.refracting and emitter.light.key in casters.bent
             lobes = ((REFRACTED,) if bends else ()) + reflected
-            sample = emitter.middle() if alone else emitter.sample(*frame.random_volume_at(index, "light"))
-            shift = frame.random_at(index, "caustics/grid")
-            for low, high in caustic_casters.boxes_of(frame, casters):
-                for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
-                    yield LitView(emitter, sample, view, lobes, index, count, weight)
+            boxes = list(caustic_casters.boxes_of(frame, casters))
+            parts = _points(emitter, boxes, count)
+            texels = max(round(side / np.sqrt(parts)), min(side, LEAST_SIDE))
+            for number in range(index * parts, (index + 1) * parts):
+                middle = alone and parts == 1
+                sample = emitter.middle() if middle else emitter.sample(*frame.random_volume_at(number, "light"))
+                shift = frame.random_at(number, "caustics/grid")
+                for low, high in boxes:
+                    for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):
+                        yield LitView(emitter, sample, view, lobes, number, count * parts, weight / parts)
 
     def _rounds(self, frame: Frame, casters: caustic_casters.Casters) -> tuple[list[lights.Emitter], int]:
         """The lights that are answered for, and how many samples have photons of all of them. Where many lights see
@@ -225,9 +247,18 @@ class Photons:
         strata = float(count) if frame.settings.whole and count > 1 else 0.0
         if count == 1:
             u, later, strata = (0.5, 0.5), (0.5, 0.5), -1.0
-        sources = self._sources.set([emitter.row(light.sample, 0, 0, light.weight)])
+        parts = self._parts if count < FEW else 1  # of several lobes each by itself: one alone would tint all
+        sources = self._sources.set([emitter.row(light.sample, 0, 0, light.weight / parts)])
         choice = frame.random_volume_at(light.index, "caustics/interface")[2]
-        drawn = self.buffers.draw(frame, technique, view, casters.materials, light.lobes, choice)
+        if parts > 1 and frame.settings.whole:
+            choice = (light.index % count + 0.5) / count
+        drawn = (
+            one
+            for part in range(parts)
+            for one in self.buffers.draw(
+                frame, technique, view, casters.materials, light.lobes, (choice + part) / parts
+            )
+        )  # fmt: skip
         for lobe, block, surfaces in drawn:
             values = {
                 "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),

@@ -13,6 +13,7 @@ import numpy as np
 
 from .working_space import current
 
+MOST_INTERFACES = 8  # of one material that rays tell apart
 MEAN_SIZE = 256  # pixels along each side that the mean of a large image is taken from
 
 
@@ -95,6 +96,19 @@ class Interface:
     fresnel: bool = True  # the rest is mirrored; False: nothing is
     multiple: bool = True  # gives back what it scatters more than once
     mirrors_color: bool = False  # what is mirrored has the colour, too
+    others: tuple[Interface, ...] = ()  # that the material has beside, of other colours or indices (dispersion)
+
+    def weighted(self, share: float) -> Interface:
+        """The same of a part of the surface."""
+        return replace(self, share=self.share * share, others=tuple(one.weighted(share) for one in self.others))
+
+    def beside(self, other: Interface | None) -> Interface:
+        """Both of them, the most first; of more than MOST_INTERFACES those are left out that are least."""
+        if other is None:
+            return self
+        alone = [replace(one, others=()) for one in (self, *self.others, other, *other.others)]
+        first, *rest = sorted(alone, key=lambda one: -one.share)[:MOST_INTERFACES]
+        return replace(first, others=tuple(rest))
 
 
 @dataclass(frozen=True)
@@ -107,7 +121,7 @@ class Summary:
     glossy: bool = False
     soft: bool = False  # a lobe of shaders/lib/soft_lobe.glsl
     tinted: bool = False  # what passes straight through may be coloured
-    glass: Interface | None = None  # the most of such lobes
+    glass: Interface | None = None  # such lobes
     scatter: float = 0.0  # about how far light spreads below the surface, m; 0: it does not
 
     def weighted(self, weight: Estimate) -> Summary:
@@ -119,7 +133,7 @@ class Summary:
             self.glossy and seen,
             self.soft and seen,
             self.tinted and seen,
-            replace(self.glass, share=self.glass.share * _share(weight)) if self.glass and seen else None,
+            self.glass.weighted(_share(weight)) if self.glass and seen else None,
             self.scatter if seen else 0.0,
         )
 
@@ -131,7 +145,7 @@ class Summary:
             self.glossy or other.glossy,
             self.soft or other.soft,
             self.tinted or other.tinted,
-            max((self.glass, other.glass), key=lambda glass: glass.share if glass else -1.0),
+            self.glass.beside(other.glass) if self.glass else other.glass,
             max(self.scatter, other.scatter),
         )
 

@@ -25,6 +25,52 @@ vec2 numbers_of(vec2 first, int interface_number)
   return fract(first + float(interface_number) * photon_light.spread.z * vec2(0.754877666, 0.569840291));
 }
 
+// What a photon's flux changes by where the normal that bends it is not that of the triangle it meets: light is followed
+// here from its source, and a camera's ray that finds the same path measures angles to the shading normal (Veach 1997,
+// 5.3.2: adjoint scattering functions of shading normals).
+float adjoint(vec3 arriving, vec3 leaving, vec3 shading, vec3 geometric)
+{
+  float numerator = abs(dot(arriving, shading) * dot(leaving, geometric));
+  float denominator = abs(dot(arriving, geometric) * dot(leaving, shading));
+  return numerator / max(denominator, 1e-3 * numerator + 1e-30);
+}
+
+// Of a material with several interfaces the one that a photon of this flux takes, in proportion to what is left of it
+// there: red light by the one for red, so that colours that are bent apart stay apart. False where it meets none.
+bool interface_of(int material, vec3 flux, float number, inout vec4 glass, inout vec4 shape, out vec3 scale)
+{
+  scale = vec3(1.0);
+  int width = interface_table_size().x;
+  if (width == 3) {
+    return number <= shape.y;
+  }
+  float shares = shape.y;
+  float left = shape.y * luminance(flux * glass.rgb);
+  for (int k = 3; k < width; k += 2) {
+    float share = interface_table_fetch(ivec2(k + 1, material)).y;
+    shares += share;
+    left += share * luminance(flux * interface_table_fetch(ivec2(k, material)).rgb);
+  }
+  float chance = min(shares, 1.0);
+  if (number > chance) {
+    return false;
+  }
+  float below = number / chance * left;
+  float part = shape.y * luminance(flux * glass.rgb);
+  for (int k = 3; k < width; k += 2) {
+    vec4 other_glass = interface_table_fetch(ivec2(k, material));
+    vec4 other_shape = interface_table_fetch(ivec2(k + 1, material));
+    if (below > part && other_shape.y > 0.0) {
+      below -= part;
+      glass = other_glass;
+      shape = other_shape;
+      part = shape.y * luminance(flux * glass.rgb);
+    }
+  }
+  scale = vec3(shape.y * left / max(chance * part, 1e-30));
+  return true;
+}
+
 // What a smooth mirror behind the first interface reflects, by the means of its material.
 vec3 mirror_color(int material, float cosine)
 {
@@ -88,6 +134,7 @@ void main()
   // Radiance does not change with the medium here, as in Cycles: what a floor under water sends out is seen undimmed by
   // 1/n^2, and so the light on it is divided by it.
   flux *= bends ? weight / (s.glossy_ior * s.glossy_ior) : weight;
+  flux *= adjoint(direction, onward, s.glossy_normal, geometric_normal);
   float path = bends ? 1.0 : 2.0;
   vec3 position = s.position;
   float travelled = 0.0;
@@ -113,7 +160,8 @@ void main()
     normal = (dot(normal, smooth_normal) < 0.0) ? -normal : normal;  // out of the solid
     bool leaves = dot(normal, onward) > 0.0;
     vec2 numbers = numbers_of(photon_light.lobe.zw, step);
-    bool is_glass = shape.y > 0.0 && numbers.x <= shape.y;
+    vec3 of_interface = vec3(1.0);
+    bool is_glass = shape.y > 0.0 && interface_of(material, flux, numbers.x, glass, shape, of_interface);
     bool mirrors = !is_glass && body.w > 0.5;
 #ifdef ABSORBING
     int solid = (leaves && shape.y > 0.0) ? material : solid_around(origin, onward, ray_offset(origin), salt + uint(step));
@@ -132,6 +180,7 @@ void main()
     smooth_normal = leaves ? -smooth_normal : smooth_normal;
     smooth_normal = (dot(smooth_normal, onward) < 0.0) ? smooth_normal : geometric_normal;
     vec2 drawn = numbers_of(photon_light.lobe.xy, step + 1);
+    vec3 came = onward;
     if (is_glass) {
       float ior = leaves ? 1.0 / glass.w : glass.w;
       vec3 scale = vec3(1.0);
@@ -164,7 +213,7 @@ void main()
     if (passes != (dot(onward, geometric_normal) < 0.0)) {
       return;
     }
-    flux *= weight;
+    flux *= of_interface * weight * adjoint(came, onward, smooth_normal, geometric_normal);
     path = mod(path * 3.0 + (passes ? 1.0 : 2.0), PATHS);
   }
 }
