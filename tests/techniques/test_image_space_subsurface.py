@@ -351,3 +351,19 @@ def test_an_open_sheet_is_the_same_on_either_side_and_as_in_cycles(stage, bend):
         pictures.append(shown(stage.render(4)).mean(axis=(0, 1)))
     assert pictures[0] == pytest.approx(pictures[1], rel=0.01)
     assert pictures[0] == pytest.approx(shown(stage.render(64, engine="CYCLES")).mean(axis=(0, 1)), rel=0.06)
+
+
+def test_relief_over_wax_is_named(stage):
+    """Points in which light enters lie on the mesh below it."""
+    wax = scattering(stage, scale=0.3)
+    nodes, links = wax.node_tree.nodes, wax.node_tree.links
+    noise, displacement = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeDisplacement")
+    links.new(noise.outputs[0], displacement.inputs["Height"])
+    output = next(one for one in nodes if one.type == "OUTPUT_MATERIAL")
+    links.new(displacement.outputs[0], output.inputs["Displacement"])
+    wax.displacement_method, wax.candela.relief_mode = "DISPLACEMENT", "RELIEF"
+    slab(stage, wax, half=1.0)
+    stage.light("SUN")
+    stage.camera_above(1.0)
+    stage.render(1, (8, 8))
+    assert any(note.material == wax.name and "below its relief" in note.text for note in stage.ledger.notes)
