@@ -311,7 +311,8 @@ def _sync_mesh(key: str, source: Source, wanted: Wanted, cache: SnapshotCache) -
     if editing:
         mesh = source.owner.to_mesh()  # asking it to preserve all layers would give the mesh before the edits
     try:
-        raw = read_mesh(mesh, wanted)
+        groups = getattr(source.owner, "vertex_groups", ()) if wanted.attributes else ()
+        raw = read_mesh(mesh, wanted, {group.name: group.index for group in groups})
         digest = raw.digest()
         if entry is not None and entry.digest == digest and entry.asked == asked:
             entry.evaluation = source.data.session_uid

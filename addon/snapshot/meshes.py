@@ -10,7 +10,7 @@ list of a quad mesh another 100 ms (Blender copies it element by element).
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -81,9 +81,9 @@ class RawMesh:
         return state.digest()
 
 
-def read_mesh(mesh, wanted: Wanted) -> RawMesh:
+def read_mesh(mesh, wanted: Wanted, groups: Mapping[str, int] | None = None) -> RawMesh:
     """Copy the arrays of an evaluated Mesh, Curves or PointCloud, or of a HairSystem. A mesh must hold data, not an
-    edit-mode wrapper."""
+    edit-mode wrapper. `groups`: indices of its object's vertex groups, which Attribute nodes may name."""
     if mesh.id_type == "HAIR":
         return _read_particle_hair(mesh, wanted)
     if mesh.id_type != "MESH":
@@ -102,7 +102,7 @@ def read_mesh(mesh, wanted: Wanted) -> RawMesh:
     face_slots = None
     if "material_index" in mesh.attributes:
         face_slots = _attribute(mesh, "material_index", "value", faces, np.int32, 1)
-    colors, active_color = _read_colors(mesh, wanted, corner_vertices, face_starts)
+    colors, active_color = _read_colors(mesh, wanted, corner_vertices, face_starts, groups or {})
     return RawMesh(
         positions,
         corner_vertices,
@@ -307,8 +307,10 @@ def _finite(values: np.ndarray) -> np.ndarray:
     return values if np.isfinite(values).all() else np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
 
 
-def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[dict[str, np.ndarray], str]:
-    """Colour attributes, and other attributes that a node asks for, as RGBA per corner.
+def _read_colors(
+    mesh, wanted: Wanted, corner_vertices, face_starts, groups: Mapping[str, int]
+) -> tuple[dict[str, np.ndarray], str]:
+    """Colour attributes, other attributes and vertex groups that a node asks for, as RGBA per corner.
 
     Blender's `color` field already decodes byte colours from sRGB. Numbers and vectors become colours as in
     Cycles' Attribute node: a number fills RGB, a vector is RGB, alpha is 1.
@@ -327,6 +329,10 @@ def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[di
             colors[name] = np.repeat(np.repeat(sharp.astype(np.float32), sizes)[:, None], 4, axis=1)
             continue
         attribute = mesh.attributes.get(name)
+        if attribute is None and name in groups:
+            colors[name] = np.ones((len(corner_vertices), 4), np.float32)
+            colors[name][:, :3] = _group_weights(mesh, groups[name])[corner_vertices][:, None]
+            continue
         values = None if attribute is None else _as_rgba(attribute)
         if values is None:
             continue
@@ -341,6 +347,12 @@ def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[di
             continue
         colors[name] = np.ascontiguousarray(_finite(values))
     return colors, active
+
+
+def _group_weights(mesh, index: int) -> np.ndarray:
+    """(V,) float32 weights of a vertex group; Blender hands them out vertex by vertex: a second for a million."""
+    weights = (next((one.weight for one in vertex.groups if one.group == index), 0.0) for vertex in mesh.vertices)
+    return np.fromiter(weights, np.float32, len(mesh.vertices))
 
 
 def _at_vertices(mesh, values: np.ndarray, kind: str) -> np.ndarray:

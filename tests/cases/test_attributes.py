@@ -118,3 +118,31 @@ def test_point_info_tells_of_points(stage, beside, output):
     inside = cycles["combined"][..., :3].max(axis=2) > 0.05
     assert inside.any()
     agree(own["combined"][..., :3][inside].mean(axis=0), cycles["combined"][..., :3][inside].mean(axis=0))
+
+
+def test_vertex_groups(stage):
+    """As in Cycles an Attribute node may name one: .2 at the left corners, .8 at the right ones, evenly between; also of
+    what a modifier has cut, and of instances. Where the object has no such group it reads 0."""
+    material = reading(stage, "ShaderNodeAttribute", "Color", attribute_name="mask")
+    card = stage.rectangle((-1, -1), (1, 1), material=material)
+    group = card.vertex_groups.new(name="mask")
+    for vertex in card.data.vertices:
+        group.add([vertex.index], 0.2 if vertex.co.x < 0 else 0.8, "REPLACE")
+    cut = card.modifiers.new("cut", "SUBSURF")
+    cut.subdivision_type, cut.levels, cut.render_levels = "SIMPLE", 2, 2
+    other = stage.rectangle((-1, -1), (1, 1), material=material, location=(0, 40, 0))
+    other.vertex_groups.new(name="other").add([0, 1, 2, 3], 0.5, "REPLACE")
+    stage.camera_above(2.0)
+    expected = 0.2 + 0.6 * (np.arange(32) + 0.5) / 32
+
+    def row():
+        stage.scene.render.filter_size = 0.01
+        return stage.render(1, (32, 32))["emission"][16]
+
+    np.testing.assert_allclose(row()[:, 0], expected, atol=0.02)
+    shown = bpy.data.collections.new("shown")
+    shown.objects.link(card)
+    stage.scene.collection.objects.unlink(card)
+    stage.link("instance", None).instance_type = "COLLECTION"
+    stage.scene.objects["instance"].instance_collection = shown
+    np.testing.assert_allclose(row()[:, 0], expected, atol=0.02)
