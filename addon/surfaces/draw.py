@@ -17,7 +17,7 @@ from ..scene.joint_draws import Joint, JointDraws
 from ..scene.materials import FIRST_VALUE, SURFACE_IMAGES, AovLayout
 from ..scene.view import VIEW
 
-STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
+STOCHASTIC, OPAQUE, LEFT_OUT, FROM_OPACITY = 0, 1, 2, 3
 TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
 
 SURFACES = tuple(f"surface.{name}" for name in SURFACE_IMAGES)
@@ -43,8 +43,9 @@ def refracts(frame: Frame) -> bool:
 
 
 def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, glass: bool) -> None:
-    """Draw what the camera sees into six surface images with a depth buffer. `mode`: STOCHASTIC, OPAQUE or LEFT_OUT
-    says what becomes of transparent layers; `glass`: it is drawn as a surface, and is no such layer."""
+    """Draw what the camera sees into six surface images with a depth buffer. `mode` says what becomes of transparent
+    layers: STOCHASTIC, OPAQUE, LEFT_OUT, or FROM_OPACITY plus thousandths of opacity. `glass`: it is drawn as a
+    surface, and is no such layer."""
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What reaches the eye where nothing is hit:
     images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
@@ -58,10 +59,20 @@ def drawing_constants(mode: int, glass: bool) -> dict[str, int]:
     return {"transparent_mode": mode, "glass_bends": int(glass), "index_shown": -1}
 
 
+def data_mode(frame: Frame) -> int:
+    """What becomes of transparent layers in Depth, Position and index passes: as in Cycles they show layers that are as
+    opaque as the view layer's alpha threshold, and thinner ones where the sample stops there."""
+    if not any(material.transparent for material in frame.materials.compiled):
+        return STOCHASTIC
+    threshold = frame.snapshot.film.alpha_threshold
+    return OPAQUE if threshold <= 0.0 else FROM_OPACITY + round(1000 * threshold)
+
+
 def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> None:
-    """Draw the pass indices of the objects and materials that the camera sees in this sample into the first image of a
+    """Draw the pass indices of the objects and materials that data passes show in this sample into the first image of a
     target as of draw_surfaces; what the others hold then is of no use."""
-    _draw_indices(frame, technique, target, [material.pass_index for material in frame.snapshot.materials])
+    indices = [material.pass_index for material in frame.snapshot.materials]
+    _draw_indices(frame, technique, target, indices, data_mode(frame))
 
 
 def draw_numbers(frame: Frame, technique: Technique, target: images.Target) -> None:
@@ -69,9 +80,11 @@ def draw_numbers(frame: Frame, technique: Technique, target: images.Target) -> N
     _draw_indices(frame, technique, target, list(range(len(frame.snapshot.materials))))
 
 
-def _draw_indices(frame: Frame, technique: Technique, target: images.Target, indices: list[int]) -> None:
+def _draw_indices(
+    frame: Frame, technique: Technique, target: images.Target, indices: list[int], mode: int = STOCHASTIC
+) -> None:
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-    constants = drawing_constants(STOCHASTIC, refracts(frame))
+    constants = drawing_constants(mode, refracts(frame))
     with passes.drawing(target):
         _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
 

@@ -37,11 +37,15 @@ from ..sources import lights
 from ..sources.environment import WORLD
 from ..surfaces.draw import (
     SOFT_DEFINES,
+    STOCHASTIC,
     SURFACE_TEXTURES,
     SURFACES,
     add_glow,
+    data_mode,
     draw_indices,
     draw_sample,
+    draw_surfaces,
+    refracts,
     surface_bindings,
 )
 
@@ -187,12 +191,6 @@ class Film(Technique):
         if TOGETHER in self._held:
             paths = ", ".join(path.label for path in LIGHT_PATHS if path.name in self._apart)
             frame.chose(self, "light paths", f"summed before the filter{f', but for {paths}' if paths else ''}")
-        passes.fullscreen(
-            DEPTH,
-            frame.target("film.depth"),
-            textures={"surface_position": frame.images["surface.position"]},
-            blocks={"film_view": frame.view_block},
-        )
         self._first_seen(frame)
 
     def sample(self, frame: Frame) -> Iterator[None]:
@@ -225,19 +223,34 @@ class Film(Technique):
             resolve(frame)
 
     def _first_seen(self, frame: Frame) -> None:
-        """What passes ask for of the surfaces in the first sample, as Cycles has it: positions and indices."""
-        film = frame.snapshot.film
-        if not frame.settings.whole:
-            return  # a viewport shows none of these
-        if film.position:
+        """What passes ask for of the surfaces in the first sample, as Cycles has it: depth, positions and indices."""
+        film, mode, whole = frame.snapshot.film, data_mode(frame), frame.settings.whole
+        anew = whole and mode != STOCHASTIC and (film.position or frame.is_apart("film.depth"))
+        position = frame.images["surface.position"]
+        with ExitStack() as stack:
+            drawn = depth = None
+            if whole and (film.indices or anew):
+                drawn = stack.enter_context(_borrowed(frame, len(SURFACES)))
+                (depth,) = stack.enter_context(_borrowed(frame, 1, "DEPTH_COMPONENT32F"))
+            if anew:
+                draw_surfaces(frame, self, images.Target(drawn, depth), mode, refracts(frame))
+                position = dict(zip(SURFACE_IMAGES, drawn))["position"]
             passes.fullscreen(
-                POSITION,
-                _target(frame, "film.position"),
-                textures={"surface_position": frame.images["surface.position"]},
-                constants={"render_origin": tuple(frame.geometry.origin)},
+                DEPTH,
+                frame.target("film.depth"),
+                textures={"surface_position": position},
+                blocks={"film_view": frame.view_block},
             )
-        if film.indices:
-            with _borrowed(frame, len(SURFACES)) as drawn, _borrowed(frame, 1, "DEPTH_COMPONENT32F") as (depth,):
+            if not whole:
+                return  # a viewport shows none of the others
+            if film.position:
+                passes.fullscreen(
+                    POSITION,
+                    _target(frame, "film.position"),
+                    textures={"surface_position": position},
+                    constants={"render_origin": tuple(frame.geometry.origin)},
+                )
+            if film.indices:
                 draw_indices(frame, self, images.Target(drawn, depth))
                 passes.copy(drawn[0], _target(frame, "film.index"))
         frame.count(self, "passes", film.position + film.indices)

@@ -51,8 +51,12 @@ void main()
 #endif
 
   float through = layer_chance(c);
-  // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
-  bool passes = (transparent_mode == 0) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
+  // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie); from 3
+  // on: stochastic, but opaque from so many thousandths of opacity on, as passes of data have it.
+  bool passes = (transparent_mode != 2) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
+  if (transparent_mode > 2 && 1.0 - dot(c.transparency, vec3(1.0 / 3.0)) >= float(transparent_mode - 3) * 1e-3 - 1e-5) {
+    passes = false;
+  }
   if (transparent_mode != 1 && passes) {
     discard;
   }

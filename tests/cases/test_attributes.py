@@ -121,7 +121,7 @@ def test_point_info_tells_of_points(stage, beside, output):
 
 
 def test_vertex_groups(stage):
-    """As in Cycles an Attribute node may name one: .2 at the left corners, .8 at the right ones, evenly between; also of
+    """As in Cycles an Attribute node may name one: .2 at the left corners, .8 at the right ones, even between; also of
     what a modifier has cut, and of instances. Where the object has no such group it reads 0."""
     material = reading(stage, "ShaderNodeAttribute", "Color", attribute_name="mask")
     card = stage.rectangle((-1, -1), (1, 1), material=material)

@@ -90,6 +90,33 @@ def test_indices_are_those_of_objects_and_materials(asked):
     assert set(np.unique(own["material_index"])) == {0.0, 300.0, 600.0}
 
 
+@pytest.mark.parametrize("threshold", [0.0, 0.5, 0.95])
+def test_layers_show_by_the_alpha_threshold(asked, threshold):
+    """As in Cycles: layers from that opacity on in full, thinner ones in as many of the pixels as they cover."""
+    asked.scene.view_layers[0].pass_alpha_threshold = threshold
+    asked.floor().pass_index = 5
+    opacity_of = (0.2, 0.7)
+    for k, opacity in enumerate(opacity_of):
+        card = asked.rectangle((-2 + 2 * k, -9), (2 * k, 9), 1.0, material=asked.principled(Alpha=opacity))
+        card.pass_index = 10 + k
+    asked.camera_above(SPAN)
+    try:
+        own, cycles = asked.both(1)
+    finally:
+        asked.scene.view_layers[0].pass_alpha_threshold = 0.5
+    for k, columns in enumerate((slice(2, 22), slice(26, 46))):
+        for name, near, far in (("depth", 9.0, 10.0), ("object_index", 10 + k, 5)):
+            shares = []
+            for found in (own, cycles):
+                values = found[name][:, columns, 0]
+                assert np.all(np.isclose(values, near, atol=1e-3) | np.isclose(values, far, atol=1e-3))
+                shares.append(np.isclose(values, near, atol=1e-3).mean())
+            if opacity_of[k] < threshold:
+                assert shares == pytest.approx([opacity_of[k]] * 2, abs=0.06)
+            else:
+                assert shares == [1.0, 1.0]
+
+
 def test_indices_change_no_picture_and_are_drawn_only_where_asked_for(asked):
     steps(asked)
     with_them = asked.render(4)
