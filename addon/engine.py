@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 
 from . import final, main_loop, viewport
+from .frame import ledger as ledgers
 from .frame import slices
 from .frame.bands import QueueLimit, samples_in_parts
 from .frame.picture import Frame
@@ -85,6 +86,7 @@ def free_sessions() -> None:
 @bpy.app.handlers.persistent
 def _another_file(*_) -> None:
     free_sessions()
+    ledgers.forget()
 
 
 def register() -> None:

@@ -19,7 +19,7 @@ from .frame import slices, time_steps
 from .frame.picture import Frame
 from .frame.run import Renderer
 from .frame.settings import Settings
-from .gfx import images
+from .gfx import images, library
 from .gfx.context import turn
 from .snapshot.light_groups import parts_of
 from .snapshot.scene import Note, Snapshot
@@ -28,6 +28,8 @@ from .ui import light_groups
 from .ui.passes import CAMERA_AXES, CATCHER, GLARE, RenderPass
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
+TAIL = 0.5  # the same, about
+TELL_S = 0.5  # between two sentences about one sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
 SHOW_SHARE = 0.04  # of the render's time, at most, that is spent on showing it
 COMBINED = "film.combined"
@@ -218,10 +220,15 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
         limit = passed + max(limit - passed, 0.0) / share.left
     wanted, first, before = frame.settings.samples_to_draw, time.perf_counter(), frame.samples_done
     shown, showing, next_picture = -1, 0.0, first + SHOW_S
+    pace, inside = SamplePace(first), Inside(frame, wanted, first)
     meter = NoiseMeter(frame.settings.noise_threshold) if frame.settings.noise_threshold else None
     for _ in order.parts(renderer, frame):
         if frame.samples_done == shown:
-            yield None
+            news = inside.news(time.perf_counter()) if order.shows else None
+            if news is not None:
+                left = left_of(order, share.left * wanted - shown, pace.each)
+                news = Progress(sentence(shown, wanted, left, news[0]), (share.number + news[1]) / share.of)
+            yield news
             continue
         shown = frame.samples_done
         picture, now = None, time.perf_counter()
@@ -234,8 +241,8 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
             took = time.perf_counter() - now
             showing += took
             next_picture = now + took + max(SHOW_S, took / SHOW_SHARE)
-        each = (now - first) / (shown - before) if shown > before else None
-        left = left_of(order, share.left * wanted - shown, each) if order.shows else None
+        pace.learn(shown - before, time.perf_counter())
+        left = left_of(order, share.left * wanted - shown, pace.each) if order.shows else None
         yield Progress(sentence(shown, wanted, left), (share.number + shown / wanted) / share.of, picture)
         if meter is not None and shown < wanted:
             with turn:
@@ -252,19 +259,60 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
                     return
 
 
+class SamplePace:
+    """What a sample takes, learned while a picture is drawn. The first one prepares much that the others find there: of
+    it alone counts what is not compiling, and nothing once another one is done."""
+
+    def __init__(self, now: float):
+        self._begun = now, library.compile_seconds
+        self._first: tuple[int, float] | None = None
+        self.each: float | None = None  # seconds; None before the first sample
+
+    def learn(self, done: int, now: float) -> None:
+        """So many samples of this picture are done."""
+        if done <= 0:
+            return
+        if self._first is None:
+            self._first = done, now
+            compiling = library.compile_seconds - self._begun[1]
+            self.each = max(now - self._begun[0] - compiling, 0.0) / done
+        elif done > self._first[0]:
+            self.each = (now - self._first[1]) / (done - self._first[0])
+
+
+class Inside:
+    """What is being done within a sample, and how much of the picture's samples is done with it, about."""
+
+    def __init__(self, frame: Frame, wanted: int, now: float):
+        self._frame, self._wanted, self._told_at = frame, wanted, now
+        self._compiled = library.compile_count
+
+    def news(self, now: float) -> tuple[str, float] | None:
+        """The sentence and the share, now and then."""
+        if now - self._told_at < TELL_S or not self._frame.at:
+            return None
+        compiles, self._told_at = library.compile_count > self._compiled, now
+        self._compiled = library.compile_count
+        labels = [technique.label for technique in self._frame.plan.techniques]
+        at = self._frame.at
+        part = labels.index(at) / len(labels) if at in labels else 0.0
+        text = f"compiling shaders for {at}" if compiles else at
+        return text, (self._frame.samples_done + part) / self._wanted
+
+
 def left_of(order: Order, samples: int, each: float | None) -> float | None:
     """Seconds that are left, by what a sample takes and by the time limit; None before the first sample."""
     if each is None:
         return None
     limit = order.settings.time_limit
-    left = samples * each
+    left = (samples + TAIL) * each
     return min(left, max(order.started + limit - time.perf_counter(), 0.0)) if limit else left
 
 
-def sentence(done: int, wanted: int, left: float | None) -> str:
-    """How far a render is, in the words that render farms read."""
+def sentence(done: int, wanted: int, left: float | None, doing: str = "") -> str:
+    """How far a render is, in the words that render farms read, and what it is doing."""
     text = f"Rendering {done} / {wanted} samples"
-    return text if left is None else f"{text}, {clock(left)} left"
+    return ", ".join((text, *([] if left is None else [f"{clock(left)} left"]), *([doing] if doing else [])))
 
 
 def clock(seconds: float) -> str:

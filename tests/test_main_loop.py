@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import namedtuple
 
 import bpy  # noqa: F401 - gpu comes with it
 import pytest
@@ -105,3 +106,26 @@ def test_the_time_that_is_left_is_told_as_clocks_show_it(seconds, text):
     assert final.clock(seconds) == text
     assert final.sentence(3, 8, seconds) == f"Rendering 3 / 8 samples, {text} left"
     assert final.sentence(3, 8, None) == "Rendering 3 / 8 samples"
+
+
+def test_time_that_is_left_forgets_the_first_sample_once_there_is_another():
+    """The first compiles programs and prepares much: of ten samples of 2 s, the first of which took 30 s, 16 s are left
+    after two."""
+    pace = final.SamplePace(100.0)
+    assert pace.each is None
+    pace.learn(1, 130.0)
+    assert pace.each <= 30.0
+    pace.learn(2, 132.0)
+    assert 8 * pace.each == 16.0
+    pace.learn(3, 134.0)
+    assert 7 * pace.each == 14.0
+
+
+def test_a_render_says_what_it_does_within_a_sample():
+    technique = namedtuple("Technique", "label")
+    plan = type("Plan", (), {"techniques": [technique("Surfaces"), technique("Direct light")]})
+    frame = type("Frame", (), {"at": "Direct light", "plan": plan, "samples_done": 2})
+    inside = final.Inside(frame, 4, 100.0)
+    assert inside.news(100.1) is None
+    assert inside.news(101.0) == ("Direct light", 0.625)
+    assert final.sentence(2, 4, 7.0, "Direct light") == "Rendering 2 / 4 samples, 0:07 left, Direct light"

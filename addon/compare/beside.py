@@ -22,6 +22,8 @@ from .reference import RenderFailed, active_view_layer, cache_folder, reference,
 
 _SAMPLE = re.compile(r"Sample (\d+)/(\d+)")
 DOING = "Cycles renders the reference"
+_NOT_SAID = re.compile(r"^(?:Fra|Mem|Time|Remaining|Peak)\b|, ")  # of the columns of a line
+MOST_SAID = 60  # letters of what Cycles says
 LAST_LINES = 5  # of the other Blender's output, shown when it fails
 
 
@@ -56,21 +58,32 @@ def _watched(path: Path, output: Path, job: dict) -> Iterator[tuple[float, str]]
     """Run the other Blender until it ends; yields the share of samples that its output tells."""
     program = f"import importlib; importlib.import_module({__name__!r}).run({json.dumps(job)!r})"
     # The file may have been opened as untrusted, of which its copy knows nothing: no scripts run there.
-    command = [bpy.app.binary_path, "--background", "--disable-autoexec", str(path)]
+    # From 5.0 on Blender tells how far a render is only where that is asked for.
+    command = [bpy.app.binary_path, "--background", "--disable-autoexec", "--log", "render", str(path)]
     command += ["--python-exit-code", "1", "--python-expr", program]
     renders = 2  # one for each seed
     with output.open("w") as file, subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT) as process:
         try:
             while process.poll() is None:
-                told = [int(done) for done, _ in _SAMPLE.findall(output.read_text(errors="replace"))]
-                finished = sum(later < earlier for earlier, later in pairwise(told))
-                yield (finished + told[-1] / job["samples"]) / renders if told else 0.0, DOING
+                yield progress_of(output.read_text(errors="replace"), job["samples"], renders)
         finally:
             if process.poll() is None:
                 process.kill()
     if process.returncode != 0:
         lines = [line for line in output.read_text(errors="replace").splitlines() if line.strip()]
         raise RenderFailed(f"Cycles could not render the reference: {' '.join(lines[-LAST_LINES:])}")
+
+
+def progress_of(text: str, samples: int, renders: int) -> tuple[float, str]:
+    """Share of the samples that an output of Cycles tells, of so many renders, and a sentence about what it does."""
+    told = [int(done) for done, _ in _SAMPLE.findall(text)]
+    finished = sum(later < earlier for earlier, later in pairwise(told))
+    which = f"{DOING}, {finished + 1} of {renders}"
+    line = next((line for line in reversed(text.splitlines()) if "Fra:" in line), "")
+    columns = [column.strip() for column in line[line.find("Fra:") :].split("|")]
+    said = [column for column in columns if column and not _NOT_SAID.search(column)]
+    share = (finished + told[-1] / samples) / renders if told else 0.0
+    return share, f"{which}: {', '.join(said)[:MOST_SAID] or 'Blender starts'}"
 
 
 def run(text: str) -> None:

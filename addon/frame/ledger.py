@@ -79,6 +79,12 @@ def publish(ledger: Ledger) -> None:
     _latest = ledger
 
 
+def forget() -> None:
+    """Another file is open: what was drawn says nothing about it."""
+    global _latest
+    _latest = None
+
+
 def latest() -> Ledger | None:
     """The ledger of the last finished or cancelled frame in this process."""
     return _latest

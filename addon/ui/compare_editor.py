@@ -33,6 +33,7 @@ VIEWS = (
 
 
 _rows: tuple[Picture, ...] = ()
+_asked_in = 0  # while a comparison shows what came out: the Image Editor in which it was begun, by its address
 
 
 def latest() -> tuple[Picture, ...]:
@@ -71,7 +72,8 @@ def picture_of(row: Picture, view: str, gain: float = 1.0) -> np.ndarray:
 def _show(self, context) -> None:
     rows = latest()
     if rows:
-        shown_images.show(context, IMAGE, picture_of(rows[min(self.row, len(rows) - 1)], self.view, self.gain))
+        picture = picture_of(rows[min(self.row, len(rows) - 1)], self.view, self.gain)
+        shown_images.show(context, IMAGE, picture, _asked_in or shown_images.editor_of(context))
 
 
 class CandelaComparison(bpy.types.PropertyGroup):
@@ -104,6 +106,7 @@ class CANDELA_OT_compare(Job, bpy.types.Operator):
     bl_label = "Compare with Cycles"
 
     def work(self, context) -> Iterator[tuple[float, str]]:
+        editor = shown_images.editor_of(context)
         scene, options = context.scene, context.window_manager.candela_comparison
         share = scene.render.resolution_percentage * options.percentage / 10000
         size = tuple(max(int(side * share), 1) for side in (scene.render.resolution_x, scene.render.resolution_y))
@@ -114,9 +117,12 @@ class CANDELA_OT_compare(Job, bpy.types.Operator):
         chosen = layer_named(scene, layer)
         steps = reference_steps(scene, options.reference_samples, settings.bounces == 0, size, chosen)
         reference = yield from part(steps, 0.5, 1.0)
-        global _rows
-        _rows = compare_passes(rendered.passes(), reference, with_flip=False)
-        _show(options, context)
+        global _rows, _asked_in
+        _rows, _asked_in = compare_passes(rendered.passes(), reference, with_flip=False), editor
+        try:
+            _show(options, context)
+        finally:
+            _asked_in = 0
         yield 1.0, "done"
 
 
@@ -207,13 +213,21 @@ _CLASSES = (
 )
 
 
+@bpy.app.handlers.persistent
+def _another_file(*_) -> None:
+    global _rows
+    _rows = ()
+
+
 def register() -> None:
     for made in _CLASSES:
         bpy.utils.register_class(made)
+    bpy.app.handlers.load_post.append(_another_file)
     bpy.types.WindowManager.candela_comparison = bpy.props.PointerProperty(type=CandelaComparison)
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_post.remove(_another_file)
     del bpy.types.WindowManager.candela_comparison
     for made in reversed(_CLASSES):
         bpy.utils.unregister_class(made)

@@ -18,6 +18,11 @@ def by_weight(notes: tuple[Note, ...]) -> list[Note]:
     return sorted(notes, key=lambda note: _MISSING.search(note.text) is None)
 
 
+def losses(notes: tuple[Note, ...]) -> list[Note]:
+    """Notes on what is missing from the picture."""
+    return [note for note in notes if _MISSING.search(note.text) is not None]
+
+
 def target(note: Note) -> tuple[str, str]:
     """Kind ('OBJECT', 'MATERIAL', 'WORLD') and name of what the note is about; ('', '') for the scene as a whole."""
     if note.material:

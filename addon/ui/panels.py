@@ -222,9 +222,11 @@ class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
         times = ", ".join(f"{name} {_seconds(seconds)}" for name, seconds in ledger.times.items() if seconds >= 0.0005)
         wrapped(column, context, f"{ledger.samples} samples" + (f": {times}" if times else ""))
         column.separator()
-        for row in ledger.rows:
-            if row.state != ledgers.SKIPPED:
-                _ledger_row(column, context, row)
+        rows = by_time(ledger.rows)
+        for row in rows:
+            _ledger_row(column, context, row)
+            if row is rows[0] and row.state == ledgers.RAN:
+                column.prop(context.scene.candela, bound_of(row.name))
 
 
 class CANDELA_RENDER_PT_frame_skipped(_CandelaPanel, bpy.types.Panel):
@@ -243,6 +245,19 @@ class CANDELA_RENDER_PT_frame_skipped(_CandelaPanel, bpy.types.Panel):
         for row in _rows():
             if row.state == ledgers.SKIPPED:
                 _ledger_row(column, context, row)
+
+
+def by_time(rows: list[ledgers.Row]) -> list[ledgers.Row]:
+    """What was not skipped, the longest first."""
+    return sorted((row for row in rows if row.state != ledgers.SKIPPED), key=lambda row: -row.milliseconds)
+
+
+def bound_of(name: str) -> str:
+    """The property of the setting that bounds what a technique costs: the first of its own that drafts bound, too, or
+    the number of samples."""
+    own = next((technique for technique in REGISTRY if technique.name == name), None)
+    bounding = (param for param in own.params_of(SCENE) if param.draft is not None) if own is not None else ()
+    return next((identifier(name, param.name) for param in bounding), "samples")
 
 
 def _rows() -> list:

@@ -148,7 +148,7 @@ def _annotations() -> dict:
             description="Filter the remaining noise of the viewport after its last sample",
         ),
         "navigation": bpy.props.EnumProperty(
-            name="Navigation", default="10",
+            name="Navigation", default="10", update=_redraw,
             description="Pictures a second while the view or the scene changes: pixels are drawn as coarse as that "
             "takes, but never fewer than 64 from top to bottom of the camera's frame",
             items=(

@@ -37,8 +37,15 @@ def _written_before(name: str):
     return next((image for image in numbered if image.get(OWN) == name), None)
 
 
-def show(context, name: str, picture: np.ndarray):
-    """Write the image and show it in every Image Editor of the window that shows nothing else of the artist's.
+def editor_of(context) -> int:
+    """The address of the Image Editor in which an operator was clicked; 0 where it was elsewhere."""
+    area = context.area
+    return area.as_pointer() if area is not None and area.type == "IMAGE_EDITOR" else 0
+
+
+def show(context, name: str, picture: np.ndarray, editor: int = 0):
+    """Write the image and show it in every Image Editor of the window that shows nothing else of the artist's, and in
+    the `editor` of this address whatever it shows.
 
     A new image is a step of its own for undo, since it may come long after the operator that wanted it has been called.
     A data-block that no step knows of would be freed by the next undo under those that point to it.
@@ -50,7 +57,9 @@ def show(context, name: str, picture: np.ndarray):
     window = context.window
     for area in window.screen.areas if window is not None else ():
         space = area.spaces.active
-        if area.type == "IMAGE_EDITOR" and (space.image is None or space.image.name.startswith("Candela ")):
+        if area.type != "IMAGE_EDITOR":
+            continue
+        if area.as_pointer() == editor or space.image is None or space.image.name.startswith("Candela "):
             space.image = image
             area.tag_redraw()
     return image

@@ -97,7 +97,8 @@ def draw(engine, context, depsgraph) -> None:
             engine.tag_redraw()  # a final render draws
     if viewport.picture is not None:
         _show(engine, scene, viewport, (region.width / size[0], region.height / size[1]))
-    engine.update_stats("Candela", viewport.status())
+    warning = viewport.warning()
+    engine.update_stats("Candela", viewport.status() + (f" | Warning: {warning}" if warning else ""))
     if not viewport.done:
         engine.tag_redraw()
     elif viewport.news:

@@ -24,11 +24,14 @@ from ..snapshot import SnapshotCache
 from ..snapshot.scene import Camera, Snapshot
 from ..surfaces.first_look import FirstLook
 from ..techniques.film import check_tree
+from ..ui.notes import losses
 from .pace import SCALES, STEP_S, GuidePace, Pace
 
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
 REST_S = 0.25  # without a change for so long, or for two redraws, the picture is drawn in finer pixels
+
+MOST_LETTERS = 160  # of a warning in the region's text, for which Blender has 512 bytes
 
 CHECKS, MOVES, CLIMBS = "checks", "moves", "climbs"  # why a frame is begun
 
@@ -126,8 +129,19 @@ class Viewport:
         done, of = self.frame.samples_done, self.frame.settings.samples
         if done == 0 and self._compiled:
             return f"Compiling shaders for {self.frame.at} ({self._compiled} so far){coarse}"
-        at = f", {self.frame.at}" if done == 0 and self.frame.at else ""
+        at = f", {self.frame.at}" if done < of and self.frame.at else ""
         return f"Sample {done} of {of}, {self.seconds:.1f} s{coarse}{at}"
+
+    def warning(self) -> str:
+        """That the picture has lost something, for the text beside; empty if nothing."""
+        if self.error or self.frame is None:
+            return ""
+        lost = losses(self.frame.ledger.notes)
+        if not lost:
+            return ""
+        more = f" (and {len(lost) - 1} more, in Render Properties)" if len(lost) > 1 else ""
+        text = str(lost[0])
+        return (text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 1] + "…") + more
 
     def attach(self, engine, orphaned: Callable[[], None]) -> None:
         """A new engine instance draws this from now on. What happened before it came is unknown: read all graphs."""

@@ -394,3 +394,23 @@ def test_the_second_blender_runs_no_scripts_of_the_file(tmp_path, monkeypatch):
     assert command.index("--disable-autoexec") < command.index(str(tmp_path / "scene.blend")), (
         "it holds for what follows"
     )
+
+
+@pytest.mark.parametrize(
+    ("output", "share", "said"),
+    [
+        ("Blender 5.2.2 LTS\n", 0.0, "1 of 2: Blender starts"),
+        (
+            "00:01.335  render           | Fra: 1 | Mem: 0M | Synchronizing object | Tall Block\n", 0.0,
+            "1 of 2: Synchronizing object, Tall Block",
+        ),
+        ("00:02.4  render  | Fra: 1 | Mem: 1M | Sample 16/64\n", 0.125, "1 of 2: Sample 16/64"),
+        ("x | Fra: 1 | Sample 64/64\nx | Fra: 1 | Mem: 1M | Sample 1/64\n", 0.5078125, "2 of 2: Sample 1/64"),
+        (
+            "Fra:1 Mem:9.5M (Peak 9.8M) | Time:00:00.11 | Mem:0.0M, Peak:0.0M | Scene, ViewLayer | Updating Lights\n",
+            0.0, "1 of 2: Updating Lights",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cycles_does_is_told_from_what_it_prints(output, share, said):
+    assert beside.progress_of(output, 64, 2) == (share, f"Cycles renders the reference, {said}")

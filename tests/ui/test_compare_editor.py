@@ -63,3 +63,33 @@ def test_every_row_can_be_shown_in_every_view(compared):
 def test_scene_without_a_camera_is_refused_with_a_sentence(registered, gpu_context, empty_scene):
     with pytest.raises(RuntimeError, match="no camera"):
         bpy.ops.candela.compare()
+
+
+def editors(*images):
+    """A context of a window with an Image Editor for each of these images, the first of which is clicked."""
+    made = []
+    for image in images:
+        space = type("Space", (), {"image": image})()
+        area = type(
+            "Area", (), {"type": "IMAGE_EDITOR", "as_pointer": lambda self: id(self), "tag_redraw": lambda _: 0}
+        )()
+        area.spaces = type("Spaces", (), {"active": space})()
+        made.append(area)
+    screen = type("Screen", (), {"areas": made})()
+    return type("Context", (), {"area": made[0], "window": type("Window", (), {"screen": screen})()})()
+
+
+def test_comparison_is_shown_where_it_was_asked_for_whatever_stands_there(compared):
+    result = type("Image", (), {"name": "Render Result"})()
+    mine = type("Image", (), {"name": "My Photograph"})()
+    context = editors(result, mine, None)
+    compare_editor._show(compared, context)
+    seen = [area.spaces.active.image for area in context.window.screen.areas]
+    assert seen[0] == seen[2] == bpy.data.images[compare_editor.IMAGE] and seen[1] is mine
+
+
+def test_another_file_clears_the_comparison(compared):
+    before = compare_editor.latest()
+    compare_editor._another_file()
+    assert before and compare_editor.latest() == ()
+    compare_editor._rows = before

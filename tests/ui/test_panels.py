@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
+from addon import engine
 from addon.frame import ledger
 from addon.frame.technique import SCENE, identifier
 from addon.snapshot.scene import Note
@@ -384,3 +385,24 @@ def test_a_setting_that_a_script_changes_is_a_change_of_the_scene(scene):
         assert tree in told
     finally:
         bpy.app.handlers.depsgraph_update_post.remove(note)
+
+
+def test_last_picture_begins_with_what_costs_most_and_the_setting_that_bounds_it(scene, published):
+    rows = [
+        ledger.Row("surfaces", "Surfaces", ledger.RAN, milliseconds=12.0),
+        ledger.Row("instant_radiosity", "Instant radiosity", ledger.RAN, milliseconds=900.0),
+        ledger.Row("film", "Film", ledger.REUSED),
+    ]
+    published(ledger.Ledger(rows, {}, samples=4))
+    text = drawn(panels.CANDELA_RENDER_PT_frame)
+    assert text.index("Instant radiosity") < text.index("instant_radiosity_virtual_lights") < text.index("Surfaces")
+    assert text.index("Surfaces") < text.index("Film")
+    for technique in REGISTRY:
+        assert hasattr(scene.candela, panels.bound_of(technique.name))
+    assert panels.bound_of("direct_light") == "samples"
+
+
+def test_another_file_clears_the_last_picture(scene, published):
+    published(ledger.Ledger([], {}, samples=4))
+    engine._another_file()
+    assert ledger.latest() is None

@@ -10,6 +10,7 @@ from addon import viewport
 from addon.frame.bands import Bands
 from addon.gfx import images
 from addon.snapshot import camera_of_scene, camera_of_view
+from addon.snapshot.scene import Note
 from addon.ui.properties import settings_of
 from tests.viewport.region import SIZE
 
@@ -114,3 +115,15 @@ def test_border_of_the_camera_lies_in_its_frame(scene, region):
     left, right, bottom, top = camera.frame
     wide = replace(camera, frame=(2 * left, 2 * right, bottom, top))
     assert viewport.render_border(region.depsgraph, None, wide, scene.camera, (400, 200)) == (100, 50, 200, 200)
+
+
+def test_the_text_says_what_the_picture_has_lost(region):
+    region.rest()
+    assert region.viewport.warning() == ""
+    lost = Note("Material 'Fur'", "'Hair' is not supported yet; it is drawn as a diffuse surface.")
+    region.viewport.frame.ledger.notes = (Note("World", "It is drawn with fewer texels."), lost)
+    assert region.viewport.warning() == str(lost)
+    region.viewport.frame.ledger.notes *= 2
+    assert region.viewport.warning().endswith("(and 1 more, in Render Properties)")
+    region.viewport.frame.ledger.notes = (Note("Material 'Fur'", 300 * "x" + " is not drawn."),)
+    assert len(region.viewport.warning()) <= 160
