@@ -319,6 +319,29 @@ def may_refract(graph: Graph) -> bool:
     )
 
 
+def least_roughness(graph: Graph) -> float:
+    """Of the graph's lobes that mirror, at least: by sockets alone, 0 where one is linked or a node is not known here;
+    infinite where no lobe mirrors."""
+    found = [np.inf]
+    for node in graph.nodes.values():
+        if node.type in MATT or not ("Bsdf" in node.type or "Eevee" in node.type):
+            continue
+        found.append(_own_value(node.inputs.get("Roughness")))
+        if node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Coat Weight")):
+            found.append(_own_value(node.inputs.get("Coat Roughness")))
+        if node.type == "ShaderNodeEeveeSpecular":
+            found.append(0.0)  # its clear coat
+    return min(found)
+
+
+MATT = {"ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", "ShaderNodeBsdfTranslucent"}
+
+
+def _own_value(socket) -> float:
+    unknown = socket is None or socket.link is not None or not isinstance(socket.value, (int, float))
+    return 0.0 if unknown else float(socket.value)
+
+
 def may_scatter(graph: Graph) -> bool:
     """Whether some node of the graph can scatter light below the surface: cheap, by its sockets alone."""
     return any(

@@ -14,8 +14,8 @@ sample, so a pane shows both its reflection and the view.
 | cost | per sample and bounce |
 |---|---|
 | rays | 1 per pixel that still has one, 1 to lights, 2 to 4 for light of other surfaces |
-| passes | 4, and 1 for each material that was met (masked by depth) |
-| readback | one flag for each material of the scene |
+| passes | 4, and 1 for each program of materials (masked by depth) |
+| samples | as many as its share of the picture asks for, each bounce by itself (frame/shares.py) |
 | bytes per pixel | 258 while it runs, of the pool |
 
 Rougher lobes than `roughness` see means (instant_radiosity.py), and so do drafts, pictures whose indirect light is not
@@ -32,6 +32,7 @@ from functools import cache
 
 from ..frame.picture import Frame
 from ..frame.settings import Settings
+from ..frame.shares import Turns
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
@@ -44,7 +45,7 @@ from ..lighting.media import LightOfMedia, MediaService, Rays, attenuated
 from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
-from ..materials.compiler import may_refract
+from ..materials.compiler import least_roughness, may_refract
 from ..scene import acceleration
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
@@ -78,6 +79,7 @@ REACH = (
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
 ORDERS = ("direct", "indirect")
+MOST_PARTS = 6  # bounces that have turns of their own (frame/shares.py); later ones have those of the last
 
 
 @cache
@@ -195,6 +197,9 @@ class ShadedReflections(Technique):
         )  # fmt: skip
         self._active = False
         self._first_rays = 0.0
+        self._turns = Turns(self, MOST_PARTS)
+        self._onward = True  # whether rays may go on from what they meet
+        self._into: dict[str, images.Image] = {}  # what this bounce adds to, by name
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
@@ -218,9 +223,18 @@ class ShadedReflections(Technique):
             sampled = frame.plan.runs("environment_light")  # of its directions rays of the first lobe leave a share
             of_first = directions_rate(frame).per_sample if sampled else 0.0
             self._first_rays = CANDIDATES * WORLD_DIRECTIONS / of_first if of_first else 0.0
+            graphs = [frame.snapshot.materials[slot].graph for slot in frame.snapshot.used_materials]
+            self._onward = any(may_refract(one) or least_roughness(one) <= ONWARD_ROUGHNESS for one in graphs)
+            if not self._onward:
+                frame.chose(self, "rays", f"1 bounce, because no material is smoother than {ONWARD_ROUGHNESS:g}")
+        guide = (SHOWN,) if frame.settings.samples > 1 else ()
+        self._turns.begin(frame, (*_names(refracts(frame), ORDERS), *guide))
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
+            return
+        if not self._turns.weight(frame):
+            frame.kept(CausticMaps).end()
             return
         hits, transmission = frame.kept(Hits), refracts(frame)
         maps = frame.kept(CausticMaps)
@@ -230,7 +244,7 @@ class ShadedReflections(Technique):
         mirrors = min(frame.settings.get(self, "bounces"), frame.settings.bounces)
         glass = next((t for t in frame.plan.techniques if "transmission" in t.fills), None)
         interfaces = frame.settings.get(glass, "interfaces") if glass else 0
-        rounds = max(mirrors, interfaces + 1 if transmission else 0)
+        rounds = max(mirrors, interfaces + 1 if transmission else 0) if self._onward else 1
         reach = {
             "mirrors": mirrors, "interfaces": interfaces, "rays": rounds, "shaded_roughness": shaded_roughness(frame)
         }  # fmt: skip
@@ -242,25 +256,27 @@ class ShadedReflections(Technique):
         try:
             self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {})
             yield
-            for number in range(rounds):
-                round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
-                met = hits.trace(frame, self, rays.colors[:2], records, number=number)
-                yield
-                yield from hits.shading(frame, self, rays.colors[1], records, met, closures, number, masked=True)
-                yield
-                self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
-                self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
-                if not met:
-                    break
-                yield
-                self._add_guide(frame, rays, records, closures, round_)
-                yield
-                self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
-                if caustics:
+            with self._turns.drawing(frame) as drawing:
+                for number in range(rounds):
+                    round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
+                    met = hits.trace(frame, self, rays.colors[:2], records, number=number)
                     yield
-                    self._add_caustics(frame, caustics, rays, records, closures, transmission)
-                yield
-                if number + 1 < rounds:
+                    hits.shade(frame, self, rays.colors[1], records, met, closures, number, masked=True)
+                    yield
+                    self._into = drawing.images(number)
+                    self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
+                    self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                    if not met:
+                        drawing.done(number)
+                        break
+                    self._add_guide(frame, rays, records, closures, round_)
+                    self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                    if caustics:
+                        self._add_caustics(frame, caustics, rays, records, closures, transmission)
+                    drawing.done(number)
+                    yield
+                    if number + 1 == rounds or not self._turns.weight(frame, number + 1):
+                        break
                     before = {
                         "met_origin": rays.colors[0], "met_direction": rays.colors[1], "met_path": rays.colors[2],
                         "met_travelled": rays.colors[3],
@@ -309,7 +325,7 @@ class ShadedReflections(Technique):
         target = images.Target((records.images["hit_passed"],), depth)
         media.fade(frame, self, passing, target, sources, count if number else 0)  # the first ray finds no lamps here
         if light is not None:
-            light.add(frame, self, passing, _target(frame, transmission, ORDERS, depth))
+            light.add(frame, self, passing, self._target(transmission, ORDERS, depth))
 
     def _add_found(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
         world = self._sources.world_flags
@@ -317,7 +333,7 @@ class ShadedReflections(Technique):
         bound = closure_bindings(closures)
         passes.fullscreen(
             found_program(transmission),
-            _target(frame, transmission, ORDERS, records.target.depth),
+            self._target(transmission, ORDERS, records.target.depth),
             blend="ADDITIVE_PREMULT",
             where=ANY_RAY,
             textures={
@@ -346,7 +362,7 @@ class ShadedReflections(Technique):
         if frame.settings.samples > 1:
             passes.fullscreen(
                 GUIDE,
-                images.Target((frame.images[SHOWN],), records.target.depth),
+                images.Target((self._into[SHOWN],), records.target.depth),
                 blend="ADDITIVE_PREMULT",
                 where=MET,
                 textures={**closure_bindings(closures), "met_path": rays.colors[2]},
@@ -370,7 +386,7 @@ class ShadedReflections(Technique):
             textures |= media.bindings
         passes.fullscreen(
             program,
-            _target(frame, transmission, ("indirect",), records.target.depth),
+            self._target(transmission, ("indirect",), records.target.depth),
             blend="ADDITIVE_PREMULT",
             where=MET,
             textures={
@@ -387,17 +403,21 @@ class ShadedReflections(Technique):
         textures = closure_bindings(closures) | {
             "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"],
         }  # fmt: skip
-        target = _target(frame, transmission, ("indirect",), records.target.depth)
+        target = self._target(transmission, ("indirect",), records.target.depth)
         caustic_maps.add_at_hits(frame, self, maps, target, transmission, MET, textures)
+
+    def _target(self, transmission: bool, orders: tuple[str, ...], depth: images.Image) -> images.Target:
+        return images.Target(tuple(self._into[name] for name in _names(transmission, orders)), depth)
 
     def release(self) -> None:
         self._sources.release()
+        self._turns.drop()
 
 
 def _state(rays: images.Target) -> dict[str, images.Image]:
     return {name: image for (_, name), image in zip(STATE, rays.colors)}
 
 
-def _target(frame: Frame, transmission: bool, orders: tuple[str, ...], depth: images.Image) -> images.Target:
+def _names(transmission: bool, orders: tuple[str, ...]) -> tuple[str, ...]:
     paths = ("glossy", "transmission") if transmission else ("glossy",)
-    return images.Target(tuple(frame.images[f"radiance.{path}_{order}"] for path in paths for order in orders), depth)
+    return tuple(f"radiance.{path}_{order}" for path in paths for order in orders)

@@ -128,3 +128,38 @@ def test_light_behind_a_pane_is_found_once(stage, roughness):
     stage.camera((0, 0, 1.5), (0, 0, 0), 0.5)
     found = reflected(stage.render(64, (12, 12), bounces=8))
     assert found.mean() == pytest.approx(1.0, abs=0.03)
+
+
+def gleaming(stage, tint):
+    """A mirror that shines by itself, so that what it shows is a part of its light alone."""
+    white = (1, 1, 1, 1)
+    return stage.principled(
+        Metallic=1.0, Roughness=0.0, Base_Color=(tint, tint, tint, 1), Emission_Color=white, Emission_Strength=1.0
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_faint_mirror_is_drawn_in_few_samples_and_shows_the_same(stage, seed):
+    """Seen straight from above it reflects its colour: .05 of the texture."""
+    stage.rectangle((-9, -9), (9, 9), material=gleaming(stage, 0.05))
+    ceiling(stage, shining(stage))
+    stage.camera_above()
+    found = reflected(stage.render(16, SIZE, bounces=2, seed=seed))
+    x, y = places(SIZE)
+    assert found[..., 0] == pytest.approx(0.05 * (x + 4) / 8, abs=3e-4)
+    assert found[..., 1] == pytest.approx(0.05 * (4 - y) / 8, abs=3e-4)
+    assert "in 5 of 16 samples" in " ".join(stage.ledger.row("shaded_reflections").choices)
+
+
+@pytest.mark.slow
+def test_a_faint_coat_costs_less_than_a_tenth_of_a_mirror(stage):
+    passes = []
+    for values in ({"Metallic": 1.0, "Roughness": 0.0}, {"Coat_Weight": 0.05, "Roughness": 0.8}):
+        stage.clear()
+        stage.world()
+        stage.rectangle((-9, -9), (9, 9), material=stage.principled(**values))
+        ceiling(stage, stage.diffuse(0.5), half=3.0)
+        stage.camera_above()
+        stage.render(128, (16, 12), bounces=1)
+        passes.append(stage.ledger.row("shaded_reflections").counters["passes"])
+    assert passes[1] < 0.1 * passes[0]

@@ -1,0 +1,50 @@
+"""Samples that a technique takes part in (sampling/turns.py), and how often it does (frame/shares.py)."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from addon.frame import shares
+from addon.sampling.sequence import bits
+from addon.sampling.turns import FEWEST, most_apart, turns
+
+
+@pytest.mark.parametrize("samples", [8, 9, 16, 50, 64, 100])
+@pytest.mark.parametrize("apart", [(1,), (2,), (4,), (1, 4), (2, 2, 8), (16,)])
+def test_both_halves_keep_their_weight_and_the_first_sample_its_own(samples, apart):
+    found = turns(samples, apart)
+    half = samples // 2
+    assert found[0] == 1.0
+    assert sum(weight for sample, weight in found.items() if sample < half) == pytest.approx(half)
+    assert sum(weight for sample, weight in found.items() if sample >= half) == pytest.approx(samples - half)
+
+
+def test_a_part_has_turns_where_that_before_it_has_one():
+    chain = [turns(64, apart) for apart in ((1,), (1, 2), (1, 2, 2), (1, 2, 2, 8))]
+    for before, after in pairwise(chain):
+        assert after.keys() <= before.keys()
+    assert [len(one) for one in chain] == [64, 33, 33, 9]
+
+
+def test_turns_are_spread_over_the_sequence():
+    """Every fourth sample would lie in one quarter of the first dimension."""
+    taken = np.array([sample for sample in turns(64, (4,)) if sample], np.uint64)
+    for dimension in (0, 1, 5, 6):
+        filled = np.bincount((bits(taken, dimension) >> np.uint64(30)).astype(int), minlength=4)
+        assert filled.min() >= 2 and filled.max() <= 6
+
+
+def test_the_smaller_a_share_the_fewer_samples():
+    assert shares.apart_by(shares.WHOLE, 64) == 1 and shares.apart_by(np.inf, 64) == 1
+    assert shares.apart_by(shares.WHOLE / 4, 64) == 2
+    assert shares.apart_by(shares.WHOLE / 17, 64) == 4
+    assert shares.apart_by(2e-5, 16) == most_apart(16) == 4 and most_apart(7, FEWEST) == 1
+    assert shares.apart_by(0.0, 16) == 8
+
+
+def test_share_of_a_gloss_that_is_a_tenth_of_the_light():
+    light = np.full(12, 2.0)
+    assert shares.share_of((0.1 * light) ** 2, light) == pytest.approx(0.01 / 1.01)
+    assert shares.share_of(np.zeros(12), np.zeros(12)) == 0.0
+    assert shares.share_of(np.ones(12), np.zeros(12)) == np.inf
