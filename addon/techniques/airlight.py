@@ -10,30 +10,28 @@ media. V are rays of the hierarchy, T is that of media.py. What media emit is in
 
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
 spread their light, divided by what lamps would send without shadows, to pixels whose rays end equally far away.
-Others take a quarter as many at every pixel, and converge. Light of several bounces, one walk a pixel and sample, is
-smooth, and spread over opacity below MANY samples: four walks at a quarter of the pixels over eight in pictures of WIDE
-pixels a side, one over four in those of SMALL. At each stop walks look for places along a lamp's rays, and at the
-surface that one of these ends at, beside those that they meet by chance; steps go on to places all around lamps, too.
+Others take a quarter as many at every pixel, and converge. Light of several bounces, and light that media bring to
+surfaces, is found by walks (lighting/media_bounces.py).
 
 | cost | per sample |
 |---|---|
-| passes | 1, and 2 at full size where it is spread |
-| rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights; 6 a stop of walks |
+| passes | 1, and 2 at full size where it is spread, and those of walks |
+| rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights |
 | memory | 3 images; 1 and 2 of a quarter where it is spread |
 
 Sources: Kulla & Fajardo 2012; Veach & Guibas 1995 (balance heuristic). In mirrors and behind glass
 (shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass more for each round of them.
 
-Bias: below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is. Penumbrae
-of round lamps where walks end are those of points in a ball. Phase functions mixed at one place are one of their mean
-anisotropy. Mirrors and glass show single scattering alone, none in drafts and rough lobes, and no beams. Of a ray that
-crosses more than twelve boundaries only the nearest twelve are known, and how often the others lead out.
+Bias: below FEW samples shafts are as wide as four pixels at least. Penumbrae of round lamps where walks end are those
+of points in a ball. Phase functions mixed at one place are one of their mean anisotropy. Mirrors and glass show single
+scattering alone, none in drafts and rough lobes, and no beams. Of a ray that crosses more than twelve boundaries only
+the nearest twelve are known, and how often the others lead out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -46,6 +44,7 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.media import RAY_TEXTURES, LightOfMedia, MediaEmission, MediaService, Rays, is_endless
+from ..lighting.media_bounces import CONSTANTS, LIT_TEXTURES, WORLD_TEXTURES, Lit, MediaBounces, defines_of
 from ..materials.compiler import may_emit
 from ..materials.graph import Graph
 from ..scene import acceleration
@@ -54,14 +53,10 @@ from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.environment import WORLD
-from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
-from ..surfaces.reflectance import Reflectance
+from ..surfaces.draw import SURFACES
 
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
-MANY = 64  # and that of several bounces, which is smoother and noisier, below these
-WIDE, SMALL = 64, 32  # pixels: in smaller pictures a mean over eight, or four, is one over much of what is seen
 COARSE = 2  # pixels of one known pixel's side then
-COARSE_WALKS = 4  # of each of them, from FEW samples on
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
 FEW_WORLD_DIRECTIONS = 8  # below FEW samples, where two are most of what the whole picture gets
 AS_IN_CYCLES = -1  # bounces: as the scene has them there
@@ -75,15 +70,6 @@ SENDING = (
 )
 
 
-LIT_TEXTURES = (*acceleration.HIERARCHY_TEXTURES, *MEDIA_TEXTURES)
-WORLD_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_map"))
-CONSTANTS = (
-    ("INT", "light_count"), ("IVEC2", "shown_pixel"), ("FLOAT", "offset_size"), ("FLOAT", "world_rows"),
-    ("INT", "glass_blocks"),  # what it bends or mirrors arrives as beams
-    ("INT", "stride"),
-)  # fmt: skip
-
-
 @cache
 def airlight_program(kinds: int, world: bool) -> Program:
     """Finds the light of media at every so many pixels, for lights of these kinds (bits as in lights.LAMPS).
@@ -94,29 +80,9 @@ def airlight_program(kinds: int, world: bool) -> Program:
         textures=(*LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "surface_position")),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
         constants=(*CONSTANTS, ("INT", "places")),
-        defines=_defines(kinds, world),
+        defines=defines_of(kinds, world),
         outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
     )
-
-
-@cache
-def indirect_program(kinds: int, world: bool, shining: bool = True) -> Program:
-    """Finds the light that media scatter after other bounces, and that they bring to surfaces. `shining`: and apart
-    from it what comes there straight from media that shine."""
-    return passes.fullscreen_program(
-        "airlight after bounces",
-        "media/indirect.frag.glsl",
-        textures=(
-            *LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "reflectance"), *SURFACE_TEXTURES,
-        ),
-        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
-        constants=(*CONSTANTS, ("INT", "is_spread"), ("INT", "walks"), ("INT", "bounces")),
-        defines=(*_defines(kinds, world), *((("SHINING", "1"),) if shining else ())),
-        outputs=tuple(
-            ("VEC4", name)
-            for name in ("out_indirect", "out_surface", "out_straight", "out_straight_surface")[: 4 if shining else 2]
-        ),
-    )  # fmt: skip
 
 
 @cache
@@ -132,10 +98,6 @@ def at_hits_program(kinds: int, world: bool, transmission: bool) -> Program:
         defines=(*seen.defines, ("AT_HITS", "1"), *((("TRANSMISSION", "1"),) if transmission else ())),
         outputs=tuple(("VEC4", f"out_{path}_{order}") for path in paths for order in ("direct", "indirect")),
     )
-
-
-def _defines(kinds: int, world: bool) -> tuple[tuple[str, str], ...]:
-    return ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
 
 
 GUIDE_TEXTURE = ("RGBA32F", "airlight_guide")
@@ -155,33 +117,18 @@ def guide_program(kinds: int) -> Program:
     )
 
 
-SPREAD, SPREAD_ON_SURFACES = (
-    passes.fullscreen_program(
-        f"airlight spread{', on surfaces' if on_surfaces else ', guided'}",
-        "media/spread.frag.glsl",
-        textures=(
-            ("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission"),
-            *ATTENUATION_TEXTURES,
-            ("RGBA32F", "surface_diffuse") if on_surfaces else GUIDE_TEXTURE,
-        ),
-        blocks=((VIEW, "film_view"),),
-        constants=(("IVEC2", "shown_pixel"), ("INT", "stride")),
-        defines=(("ON_SURFACES" if on_surfaces else "GUIDED", "1"),),
-        outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
-    )
-    for on_surfaces in (False, True)
+SPREAD = passes.fullscreen_program(
+    "airlight spread, guided",
+    "media/spread.frag.glsl",
+    textures=(
+        ("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission"),
+        *ATTENUATION_TEXTURES, GUIDE_TEXTURE,
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("IVEC2", "shown_pixel"), ("INT", "stride")),
+    outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
 )  # fmt: skip
-PROGRAMS = (airlight_program(-1, True), indirect_program(-1, True), at_hits_program(-1, True, True), guide_program(-1))
-
-
-@dataclass(frozen=True)
-class _Lit:
-    """What shines into media in a sample: lights' kinds as bits, how many rows, and what programs bind for them."""
-
-    kinds: int
-    rows: int
-    textures: dict[str, images.Image]
-    blocks: dict[str, object]
+PROGRAMS = (airlight_program(-1, True), at_hits_program(-1, True, True), guide_program(-1))
 
 
 class Airlight(Technique):
@@ -215,7 +162,7 @@ class Airlight(Technique):
     def __init__(self):
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
-        self._reflectance = Reflectance()
+        self._bounces = MediaBounces()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not has_media(snapshot):
@@ -230,8 +177,6 @@ class Airlight(Technique):
             return
         lit, world = self._lit_by(frame, media), self._lit_by_world
         coarse = frame.settings.samples < FEW
-        spread_after = coarse or (frame.settings.samples < MANY and min(frame.size) >= SMALL)
-        coarse_after = coarse or (spread_after and min(frame.size) >= WIDE)
         stride = COARSE if coarse else 1
         asked = self._asked(frame, lit)
         turn = (frame.sample % COARSE, frame.sample // COARSE % COARSE)
@@ -239,34 +184,21 @@ class Airlight(Technique):
         frame.target("radiance.volume_emission").clear()
         rays = frame.settings.get(self, "rays") * stride * stride
         places = places_of(rays, lit.rows + world)
-        yield from self._add(
-            frame, airlight_program(kinds, world), ("radiance.volume_direct", "radiance.volume_emission"),
-            SPREAD if coarse else None, stride,
-            textures=textures | {"surface_position": frame.images["surface.position"]},
-            blocks=blocks, constants=asked | {
-                "places": places, "shown_pixel": turn if coarse else (0, 0), "stride": stride,
-            },
-        )  # fmt: skip
+        program, names = airlight_program(kinds, world), ("radiance.volume_direct", "radiance.volume_emission")
+        bindings = {
+            "textures": textures | {"surface_position": frame.images["surface.position"]}, "blocks": blocks,
+            "constants": asked | {"places": places, "shown_pixel": turn if coarse else (0, 0), "stride": stride},
+        }  # fmt: skip
+        if coarse:
+            yield from self._draw_spread(frame, program, names, stride, **bindings)
+        else:
+            yield from self._draw(frame, program, names, **bindings)
         frame.count(self, "light samples", lit.rows)
         bounces = min(frame.settings.bounces, max(frame.settings.get(self, "bounces"), 0))
-        if bounces and (media.media.scatters or media.media.emits):
-            self._reflectance.update(frame)
-            shining = media.media.emits
-            stride_after = COARSE if coarse_after else 1
-            names = "radiance.volume_indirect", "radiance.diffuse_indirect"
-            names += ("radiance.volume_direct", "radiance.diffuse_direct") if shining else ()
-            yield from self._add(
-                frame, indirect_program(kinds, world, shining), names,
-                SPREAD_ON_SURFACES if spread_after else None, stride_after,
-                textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
-                blocks=blocks,
-                constants=asked | {
-                    "bounces": bounces, "shown_pixel": turn if coarse_after else (0, 0), "stride": stride_after,
-                    "is_spread": int(spread_after), "walks": COARSE_WALKS if coarse_after and not coarse else 1,
-                },
-            )  # fmt: skip
+        if frame.settings.bounces and (media.media.scatters or media.media.emits):
+            yield from self._bounces.sample(frame, self, media.media, lit, asked, bounces)
 
-    def _lit_by(self, frame: Frame, media: MediaService) -> _Lit:
+    def _lit_by(self, frame: Frame, media: MediaService) -> Lit:
         """What shines into media in this sample."""
         rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
         kinds = lights.kinds_of(emitters) | sum(
@@ -280,11 +212,11 @@ class Airlight(Technique):
                 "environment_density_map": frame.environment.density_map,
             }
             blocks["world_light"] = frame.environment.block
-        self._lit = _Lit(kinds, len(rows), textures, blocks)
+        self._lit = Lit(kinds, len(rows), self._lit_by_world, textures, blocks)
         return self._lit
 
     @staticmethod
-    def _asked(frame: Frame, lit: _Lit) -> dict[str, object]:
+    def _asked(frame: Frame, lit: Lit) -> dict[str, object]:
         """CONSTANTS but for the pixel."""
         return {
             "light_count": lit.rows, "offset_size": frame.offset_size, "world_rows": float(world_directions(frame)),
@@ -304,39 +236,36 @@ class Airlight(Technique):
         )  # fmt: skip
         frame.count(technique, "passes")
 
-    def _add(
-        self, frame: Frame, program: Program, names: tuple[str, ...], spread: Program | None, stride: int, **bindings
-    ):
-        """Draw a program's outputs into sums, where it is asked at few pixels spread over all, two by two."""
-        frame.count(self, "passes", 1 + (len(names) // 2 if spread is not None else 0))
-        if spread is None:
-            target = frame.target(*names)
-            for band in frame.bands(self, names[0]):
-                passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
-                yield
-            return
+    def _draw(self, frame: Frame, program: Program, names: tuple[str, ...], **bindings) -> Iterator[None]:
+        """Draw a program's outputs into sums, band by band."""
+        frame.count(self, "passes")
+        target = frame.target(*names)
+        for band in frame.bands(self, names[0]):
+            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
+            yield
+
+    def _draw_spread(
+        self, frame: Frame, program: Program, names: tuple[str, ...], stride: int, **bindings
+    ) -> Iterator[None]:
+        """The same of what is asked at few pixels and spread over all."""
+        frame.count(self, "passes", 3)
         size = tuple(-(-side // stride) for side in frame.size)
         found = tuple(images.pool.take(*size, "RGBA32F") for _ in names)
         passes.fullscreen(program, images.Target(found), **bindings)
         yield
-        read = {name: frame.images[name.replace("_", ".", 1)] for _, name in spread.textures if "surface" in name}
-        if spread is SPREAD:
-            found += (images.pool.take(*frame.size, "RGBA32F"),)
-            program = guide_program(self._lit.kinds)
-            bound = bindings["textures"] | read
+        textures, blocks = bindings["textures"], bindings["blocks"]
+        with images.borrowed(*frame.size, "RGBA32F") as guide:
+            asks = guide_program(self._lit.kinds)
             passes.fullscreen(
-                program, images.Target(found[2:]), textures={name: bound[name] for _, name in program.textures},
-                blocks={name: bindings["blocks"][name] for _, name in program.blocks},
+                asks, guide, textures={name: textures[name] for _, name in asks.textures},
+                blocks={name: blocks[name] for _, name in asks.blocks},
                 constants={"light_count": self._lit.rows, "glass_blocks": 0},
             )  # fmt: skip
-            read["airlight_guide"] = found[2]
-            frame.count(self, "passes")
-        for k in range(0, len(names), 2):
+            read = {name: textures[name] for _, name in SPREAD.textures if name in textures}
             passes.fullscreen(
-                spread, frame.target(*names[k : k + 2]), blend="ADDITIVE_PREMULT",
+                SPREAD, frame.target(*names), blend="ADDITIVE_PREMULT",
                 textures={
-                    **read, "coarse_direct": found[k], "coarse_emission": found[k + 1],
-                    **{name: bindings["textures"][name] for _, name in ATTENUATION_TEXTURES},
+                    **read, "coarse_direct": found[0], "coarse_emission": found[1], "airlight_guide": guide.colors[0],
                 },
                 blocks={"film_view": frame.view_block},
                 constants={name: bindings["constants"][name] for name in ("shown_pixel", "stride")},
@@ -388,7 +317,7 @@ class Airlight(Technique):
 
     def release(self) -> None:
         self._sources.release()
-        self._reflectance.release()
+        self._bounces.release()
         self._triangles = None
 
 

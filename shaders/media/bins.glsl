@@ -88,6 +88,31 @@ vec3 media_scattered(uint inside, vec3 position, vec3 in_direction, vec3 out_dir
   return sum;
 }
 
+// The same for each unit of the scattering coefficient.
+vec3 media_scattered_by_unit(uint inside, vec3 position, vec3 in_direction, vec3 out_direction, uint cell_seed)
+{
+  float mu = dot(in_direction, out_direction);
+  vec3 sum = vec3(0.0);
+  vec3 total = vec3(0.0);
+  while (inside != 0u) {
+    int medium = findLSB(inside);
+    inside &= inside - 1u;
+    Medium m = medium_read(medium);
+#ifdef MEDIA_GRIDS
+    if (m.grid > 0.5) {
+      uint seed = cell_seed + uint(medium);
+      ivec2 cell = medium_cell(medium, position, seed);
+      m.scattering = media_scattering_fetch(cell).rgb;
+      m.anisotropy = media_extinction_fetch(cell).w;
+    }
+#endif
+    vec3 amount = m.scattering + 1e-20;  // where nothing scatters, something beside it may
+    sum += amount * phase_value(m.phase, m.anisotropy, m.phase_values, mu);
+    total += amount;
+  }
+  return sum / max(total, vec3(1e-30));
+}
+
 // Anisotropy of the lobe by which a direction is drawn at a place: the mean over what scatters there.
 float media_lobe(uint inside, vec3 position, uint cell_seed)
 {

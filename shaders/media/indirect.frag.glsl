@@ -1,7 +1,9 @@
-// Light that media scatter after other bounces, and that they bring to surfaces: `walks` of up to `bounces` steps for each.
+// Light that media scatter after other bounces, and that they bring to surfaces: `walks` of up to `bounces` steps.
 //
-// The first walk starts at a place on the view ray, the second at the surface, whose irradiance it finds (of what media
-// scatter; light of other surfaces is not its matter). Each asks one row of lights, drawn evenly. At each stop it looks once
+// FROM_SURFACES: walks start at the surface that a pixel shows, whose irradiance they find (of what media scatter; light of
+// other surfaces is not their matter). FROM_FROXELS: they start anywhere in a cell of the grid along the view (froxels.glsl),
+// and find the light that a medium there would send to the eye for each unit of its scattering coefficient. Else they start
+// at a place on a pixel's view ray. ONE_STEP: `bounces` is 1. Each asks one row of lights, drawn evenly. At each stop it looks once
 // for a place in media that the row lights: drawn along rays of the lamp (media/from_lamps.glsl) or by the phase function or
 // cosine and around the lamp, weighted by the balance heuristic. Then it goes on by phase function or cosine, to a place in
 // media drawn by what they let pass, or to a surface, where the row is asked.
@@ -9,7 +11,20 @@
 #include "media/arriving.glsl"
 #include "media/from_lamps.glsl"
 #include "media/view_ray.glsl"
-#include "media/dither.glsl"
+#ifdef FROM_FROXELS
+#include "media/froxels.glsl"
+#endif
+
+#ifdef ONE_STEP
+#define MORE_STEPS false
+#else
+#define MORE_STEPS true
+#endif
+#if defined(SHINING) || !defined(ONE_STEP)
+#define GOES_ON true
+#else
+#define GOES_ON false
+#endif
 
 vec3 mean_albedo(ivec2 hit)
 {
@@ -63,6 +78,7 @@ struct Stop {
   float lobe;    // anisotropy
   vec3 normal;
   vec3 face;     // geometric normal
+  bool by_unit;  // what it sends is for each unit of scattering
 };
 
 float stop_density(Stop stop, vec3 way)
@@ -84,6 +100,11 @@ vec3 stop_sends(Stop stop, vec3 way, float density, uint seed)
   if (stop.inside == 0u) {
     return vec3(density);
   }
+#ifdef FROM_FROXELS
+  if (stop.by_unit) {
+    return media_scattered_by_unit(stop.inside, stop.position, -way, stop.onwards, seed);
+  }
+#endif
   return media_scattered(stop.inside, stop.position, -way, stop.onwards, seed);
 }
 
@@ -123,10 +144,11 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
   LampRays rays = lamp_rays(number, ask_turn);
   bool lit_exists = false;
   vec3 lit = vec3(0.0);  // the surface where a ray of the lamp ends
-  int task = rays.shadow ? FIND_LIT : LOOK;
+  int task = (MORE_STEPS && rays.shadow) ? FIND_LIT : LOOK;
   int bounce = 0;
-  for (int i = 0; i < 3 * bounces + 1 && bounce < bounces; i++) {
-    int doing = task;
+  int rounds = MORE_STEPS ? 3 * bounces + 1 : (GOES_ON ? 2 : 1);
+  for (int i = 0; i < rounds && bounce < bounces; i++) {
+    int doing = (MORE_STEPS || (GOES_ON && task == GO_ON)) ? task : LOOK;
     bool first_surface = !(media_only && bounce == 0);
     task = (doing == FIND_LIT) ? LOOK : ((doing == LOOK) ? (lit_exists && first_surface ? LOOK_AT_LIT : GO_ON)
                                                         : ((doing == LOOK_AT_LIT) ? GO_ON : LOOK));
@@ -142,15 +164,15 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     vec3 from = stop.position;
     float wanted = -1.0;
     vec3 way;
-    bool more = doing == GO_ON && bounce + 1 < bounces;
+    bool more = MORE_STEPS && doing == GO_ON && bounce + 1 < bounces;
     LampRays aiming = rays;
     aiming.wide = (doing == GO_ON) ? 0.5 : 0.0;
     float aimed = !rays.exist ? 0.0 : ((doing == LOOK) ? 0.5 : (more ? AIMED : 0.0));  // share along rays of the lamp
-    if (doing == FIND_LIT) {
+    if (MORE_STEPS && doing == FIND_LIT) {
       way = lamp_rays_way(rays, turn);
       from = ray_origin(rays.source, (dot(way, rays.face) < 0.0) ? -rays.face : rays.face);
     }
-    else if (doing == LOOK_AT_LIT || media_random(seed) < aimed) {
+    else if ((MORE_STEPS && doing == LOOK_AT_LIT) || media_random(seed) < aimed) {
       vec3 offset = (doing == LOOK_AT_LIT) ? lit - from : lamp_rays_draw(aiming, from, vec3(turn, media_random(seed)));
       wanted = length(offset);
       way = offset / max(wanted, 1e-30);
@@ -166,7 +188,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       continue;
     }
     ivec2 hit;
-    bool from_source = doing == FIND_LIT;  // this ray is the shadow ray of what it finds
+    bool from_source = MORE_STEPS && doing == FIND_LIT;  // this ray is the shadow ray of what it finds
     float limit = trace_layers(from, way, 1e29, 0.0, seed, from_source && glass_blocks != 0, from_source, hit);
     if (from_source) {
       lit_exists = hit.x >= 0;
@@ -219,15 +241,16 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       if (doing == LOOK && number >= 0) {
         asked = ask_scattered(number, bins.media[k], position, -way, ask_turn, seed);
       }
-      else if (doing != LOOK) {
+      else if (MORE_STEPS && doing != LOOK) {
         weight = arrives;
         arrives = vec3(0.0);
         stop.inside = bins.media[k];
         stop.lobe = media_lobe(stop.inside, position, seed);
         stop.onwards = -way;
+        stop.by_unit = false;
       }
     }
-    else if (doing != LOOK && at_surface && (doing == GO_ON || abs(limit - wanted) < 1e-3 * wanted)) {
+    else if (MORE_STEPS && doing != LOOK && at_surface && (doing == GO_ON || abs(limit - wanted) < 1e-3 * wanted)) {
       vec3 normal = triangle_normal(hit);
       normal = (dot(normal, way) > 0.0) ? -normal : normal;
       position = ray_origin(position + limit * way, normal);
@@ -255,6 +278,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
         stop.inside = 0u;
         stop.normal = normal;
         stop.face = normal;
+        stop.by_unit = false;
       }
     }
     sum += arrives * rows_stood_for(number) * asked_arriving(asked, position, seed);
@@ -278,87 +302,129 @@ vec3 finite_sum(vec3 sum)
   return (is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z)) ? sum : vec3(0.0);
 }
 
+// Where a walk starts and how much of what it finds counts; none where that is 0.
+struct Start {
+  Stop stop;
+  vec3 weight;
+};
+
+Start start_at(vec3 position, vec3 onwards)
+{
+  Start start;
+  start.stop.position = position;
+  start.stop.onwards = onwards;
+  start.stop.inside = 0u;
+  start.stop.lobe = 0.0;
+  start.stop.normal = vec3(0.0, 0.0, 1.0);
+  start.stop.face = vec3(0.0, 0.0, 1.0);
+  start.stop.by_unit = false;
+  start.weight = vec3(0.0);
+  return start;
+}
+
+#if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
+Start on_ray(ViewRay ray, Bins bins, int number, vec2 ask_turn, float v, uint seed)
+{
+  Start start = start_at(ray.origin, -ray.direction);
+  if (!(bins.total > 0.0) || bins.count == 0) {
+    return start;
+  }
+  LampRays rays = lamp_rays(number, ask_turn);
+  float deep = bins_deep(bins, SEEN_DEPTH);  // in endless fog all but a few places lay beyond, where nothing is seen
+  Near near = near_lamp(rays, number, ray.origin, ray.direction, bins.from[0], deep);
+  int k;
+  float t;
+  if (near.exist && v < 0.5) {
+    t = near_draw(near, 2.0 * v);
+    k = bins_find(bins, t);
+  }
+  else {
+    t = bins_draw(bins, near.exist ? 2.0 * v - 1.0 : v, k);
+  }
+  if (k >= 0) {
+    float density = bins_density(bins, k, t);
+    density = near.exist ? 0.5 * (density + near_density(near, t)) : density;
+    start.stop.position += t * ray.direction;
+    start.stop.inside = bins.media[k];
+    start.stop.lobe = media_lobe(start.stop.inside, start.stop.position, seed);
+    start.weight = bin_passing(bins, k, t) / max(density, 1e-30);
+  }
+  return start;
+}
+#endif
+
 void main()
 {
-  out_indirect = vec4(0.0);
-  out_surface = vec4(0.0);
-  ivec2 size = surface_position_size();
-  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * stride + shown_pixel, size - 1);
-  vec4 seen = surface_position_fetch(pixel);
-  ViewRay ray = view_ray(seen, vec2(pixel) + 0.5);
-  uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 44).x;
-  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 4711u));
-  Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
-  if (is_spread != 0) {
-    out_indirect.w = min(ray.limit, 1e18);
-    out_surface.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
-  }
+  out_found = vec4(0.0);
 #ifdef SHINING
-  out_straight = out_indirect;
-  out_straight_surface = out_surface;
+  out_straight = vec4(0.0);
 #endif
+  ivec2 size = surface_position_size();
+#ifdef FROM_FROXELS
+  ivec3 cell = froxel_of(ivec2(gl_FragCoord.xy));
+  uint seed = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 48).x;
+  vec2 place = froxel_pixel(cell, vec2(media_random(seed), media_random(seed)));
+  ivec2 pixel = clamp(ivec2(place), ivec2(0), size - 1);
+  ViewRay ray = view_ray(surface_position_fetch(pixel), vec2(pixel) + 0.5);
+  float away = froxel_distance(float(cell.z) + media_random(seed));
+  if (away >= ray.limit) {
+    return;
+  }
+  Start start = start_at(ray.origin + away * ray.direction, -ray.direction);
+  start.stop.inside = media_at_start(media_crossings(start.stop.position, ray.direction));
+  if (start.stop.inside == 0u) {
+    return;
+  }
+  start.stop.lobe = media_lobe(start.stop.inside, start.stop.position, seed);
+  start.stop.by_unit = true;
+  start.weight = vec3(1.0);
+  out_found.w = 1.0;
+#else
+  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * stride + shown_pixel, size - 1);
+  ViewRay ray = view_ray(surface_position_fetch(pixel), vec2(pixel) + 0.5);
+  uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 44).x;
+#ifdef FROM_SURFACES
   Surface s = SURFACE_READ(pixel);
-  // One walk after the other, so that the program holds it once.
-  for (int which = 0; which < 2 * walks; which++) {
-    bool from_surface = (which & 1) == 1;
-    int turn = film_view.sample_index * walks + (which >> 1);
-    uvec2 moved = salt.xy + uint(which >> 1) * 0x9E3779B1u;
+  Start start = start_at(ray_origin(s.position, s.geometric_normal), -ray.direction);
+  start.stop.normal = s.normal;
+  start.stop.face = s.geometric_normal;
+  start.weight = (is_spread != 0) ? vec3(1.0) : s.diffuse;
+  if (is_spread != 0) {
+    // For what spreads this over the pixels around: light of nothing counts as nothing.
+    out_found.w = (ray.hit && max_component(s.diffuse) > 0.0) ? min(ray.limit, 1e18) : -1.0;
+  }
+  if (!ray.hit || !(max_component(s.diffuse) > 0.0)) {
+    return;
+  }
+#else
+  Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
+#endif
+#endif
+  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) + 4711u));
+  vec3 sum = vec3(0.0);
+  vec3 straight_sum = vec3(0.0);
+  for (int which = 0; which < walks; which++) {
+    int turn = film_view.sample_index * walks + which;
+    uvec2 moved = salt.xy + uint(which) * 0x9E3779B1u;
     vec2 u = vec2(scrambled(film_view.bits_x, moved.x), scrambled(film_view.bits_y, moved.y));
     int number = draw_row(shuffled(turn, salt.zx));
     vec2 ask_turn = vec2(media_random(seed), media_random(seed));
-    Stop stop;
-    stop.position = ray.origin;
-    stop.onwards = -ray.direction;
-    stop.inside = 0u;
-    stop.lobe = 0.0;
-    stop.normal = s.normal;
-    stop.face = s.geometric_normal;
-    vec3 weight = vec3(0.0);
-    if (!from_surface && bins.total > 0.0 && bins.count > 0) {
-      LampRays rays = lamp_rays(number, ask_turn);
-      float deep = bins_deep(bins, SEEN_DEPTH);  // in endless fog all but a few places lay beyond, where nothing is seen
-      Near near = near_lamp(rays, number, ray.origin, ray.direction, bins.from[0], deep);
-      float v = shuffled(turn, salt.yz);
-      int k;
-      float t;
-      if (near.exist && v < 0.5) {
-        t = near_draw(near, 2.0 * v);
-        k = bins_find(bins, t);
-      }
-      else {
-        t = bins_draw(bins, near.exist ? 2.0 * v - 1.0 : v, k);
-      }
-      if (k >= 0) {
-        float density = bins_density(bins, k, t);
-        density = near.exist ? 0.5 * (density + near_density(near, t)) : density;
-        stop.position += t * ray.direction;
-        stop.inside = bins.media[k];
-        stop.lobe = media_lobe(stop.inside, stop.position, seed);
-        weight = bin_passing(bins, k, t) / max(density, 1e-30);
-      }
-    }
-    if (from_surface && ray.hit && max_component(s.diffuse) > 0.0) {
-      stop.position = ray_origin(s.position, s.geometric_normal);
-      weight = (is_spread != 0) ? vec3(1.0) : s.diffuse;
-    }
-    if (max_component(weight) > 0.0) {
-      vec3 straight;
-      vec3 found = finite_sum(walk(stop, weight, number, ask_turn, from_surface, u, seed, straight)) / float(walks);
-      if (from_surface) {
-        out_surface.rgb += found;
-      }
-      else {
-        out_indirect.rgb += found;
-      }
-#ifdef SHINING
-      straight = finite_sum(straight) / float(walks);
-      if (from_surface) {
-        out_straight_surface.rgb += straight;
-      }
-      else {
-        out_straight.rgb += straight;
-      }
+#if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
+    Start start = on_ray(ray, bins, number, ask_turn, shuffled(turn, salt.yz), seed);
 #endif
+    if (max_component(start.weight) > 0.0) {
+      vec3 straight;
+#ifdef FROM_SURFACES
+      const bool media_only = true;
+#else
+      const bool media_only = false;
+#endif
+      sum += finite_sum(walk(start.stop, start.weight, number, ask_turn, media_only, u, seed, straight));
+      straight_sum += finite_sum(straight);
     }
   }
+  out_found.rgb = sum / float(walks);
+#ifdef SHINING
+  out_straight = vec4(straight_sum / float(walks), out_found.w);
+#endif
 }

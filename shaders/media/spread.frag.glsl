@@ -2,7 +2,7 @@
 // all 16 numbers of the dither among them, of those whose ray ends about as far away and is hidden about as much.
 //
 // What is spread is light over what is known at each pixel: opacity, so that outlines of media and their detail stay sharp,
-// and with GUIDED what lamps would send without shadows (guide.frag.glsl), so that peaks around them stay where they are.
+// and what lamps would send without shadows (guide.frag.glsl), so that peaks around them stay where they are.
 #include "media/media.glsl"
 #include "media/view_ray.glsl"
 
@@ -28,12 +28,10 @@ void main()
   vec4 emission = vec4(0.0);
   float total = 0.0;
   float known_opacity = 0.0;
-#ifdef GUIDED
   vec3 guided = vec3(0.0);
   vec3 guides = vec3(0.0);
   vec3 here = airlight_guide_fetch(pixel).rgb;
   ivec2 last = airlight_guide_size() - 1;
-#endif
   for (int y = -2; y <= 2; y++) {
     for (int x = -2; x <= 2; x++) {
       ivec2 known = corner + ivec2(x, y);
@@ -47,30 +45,20 @@ void main()
       direct += weight * found;
       emission += weight * second;
       known_opacity += weight * second.w;
-#ifdef GUIDED
       // Shares of light, each as good as the next one: a peak among them must not outweigh all, nor a share of nothing.
       vec3 there = airlight_guide_fetch(min(other * stride + shown_pixel, last)).rgb;
       vec3 trust = weight / max(there + here, vec3(1e-20));
       guided += trust * found.rgb;
       guides += trust * there;
-#endif
       total += weight;
     }
   }
   float share = (known_opacity > 0.0) ? opacity / known_opacity : 0.0;
-#ifdef GUIDED
   // What no place of the guide has met stays where it is.
   ivec2 nearest = clamp(ivec2(floor(middle + 0.5)), ivec2(0), size - 1);
   vec3 stays = coarse_direct_fetch(nearest).rgb * opacity / max(coarse_emission_fetch(nearest).w, 1e-30);
   out_direct = vec4(mix(stays, guided * here / max(guides, vec3(1e-30)), greaterThan(guides, vec3(0.0))), 0.0);
-#else
-  out_direct = vec4(direct.rgb * share, 0.0);
-#endif
-#ifdef ON_SURFACES
-  out_emission = vec4(emission.rgb / max(total, 1e-30) * surface_diffuse_fetch(pixel).rgb, 0.0);
-#else
   // Thin fire hides nothing and still shines.
   float evenly = 1.0 / max(total, 1e-30);
   out_emission = vec4(emission.rgb * ((opacity > 1e-3) ? share : evenly), 0.0);
-#endif
 }
