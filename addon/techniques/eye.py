@@ -18,6 +18,7 @@ the pictures before it. Bias and sources: addon/eye/point_spread.py.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -42,9 +43,14 @@ MODE = Param(
 )  # fmt: skip
 LUMINANCE_STEP = 0.02  # decades; as much as noise of the first samples changes the mean, and 0.02 mm of a pupil
 DRAFT_SIDE = 256
-SIDES = tuple(
-    (str(side), f"{side} x {side}", side, f"The pattern has {side} texels along each side")
-    for side in (128, 256, 512, 1024, 2048)
+AUTO = "AUTO"
+LEAST_SIDE, MOST_SIDE = 512, 2048  # of a pattern whose size follows from the brightness of the picture
+SIDES = (
+    (AUTO, "Automatic", 0, "As large as the brightest light needs, so that its glare ends where nobody sees it"),
+    *(
+        (str(side), f"{side} x {side}", side, f"The pattern has {side} texels along each side")
+        for side in (128, 256, 512, 1024, 2048)
+    ),
 )
 
 
@@ -57,6 +63,7 @@ class PointSpread(Service):
         self._technique = technique
         self._pattern: tuple[object, point_spread.Pattern] | None = None
         self._kernel: tuple[object, point_spread.Kernel] | None = None
+        self._side = LEAST_SIDE
 
     def aperture(self, frame: Frame, luminance: float) -> Aperture:
         """While the eye looks at a picture of this mean luminance, cd/m2."""
@@ -66,16 +73,25 @@ class PointSpread(Service):
             eye_of(frame.settings), seconds * frame.settings.get(self._technique, "speed"), 10.0**decades
         )
 
-    def scale(self, frame: Frame, aperture: Aperture, degrees_per_pixel: float, magnification: float) -> optics.Scale:
-        """How the pattern lies on pixels of this size."""
+    def scale(
+        self, frame: Frame, aperture: Aperture, degrees_per_pixel: float, magnification: float,
+        is_seen: Callable[[optics.Scale], bool],
+    ) -> optics.Scale:  # fmt: skip
+        """How the pattern lies on pixels of this size. `is_seen`: whether the glare is still seen at the rim of a
+        kernel; a pattern whose size is automatic grows as long as it is."""
         defocus = frame.settings.get(self._technique, "defocus")
-        side = self._technique.side(frame.settings)
-        return optics.scale_of(side, degrees_per_pixel, magnification, aperture.diameter, defocus, max(frame.size))
+        self._side, most = self._technique.sides(frame.settings)
+        while True:
+            longest = max(frame.size)
+            scale = optics.scale_of(self._side, degrees_per_pixel, magnification, aperture.diameter, defocus, longest)
+            if self._side >= most or scale.reach >= longest or not is_seen(scale):
+                return scale
+            self._side *= 2
 
     def pattern(self, frame: Frame, aperture: Aperture) -> point_spread.Pattern:
         """Of white light; drawn anew where the aperture differs. It is the service's own."""
         settings, technique = frame.settings, self._technique
-        side, defocus = technique.side(settings), settings.get(technique, "defocus")
+        side, defocus = self._side, settings.get(technique, "defocus")
         least = settings.get(technique, "wavelengths")
         key = (side, defocus, least, aperture.diameter, aperture.closed, aperture.strokes.tobytes())
         if self._pattern is None or self._pattern[0] != key:
@@ -154,7 +170,7 @@ class EyeModel(Technique):
             0.0, 1.0,
         ),
         Param(
-            "side", "Pattern Size", "512",
+            "side", "Pattern Size", AUTO,
             "Texels along each side of the diffraction pattern; twice as many reach twice as far. Drafts use at most "
             "256",
             items=SIDES,
@@ -177,10 +193,11 @@ class EyeModel(Technique):
             return "nothing asks for the eye's point spread"
         return None
 
-    def side(self, settings: Settings) -> int:
-        """Of the pattern, texels."""
-        side = int(settings.get(self, "side"))
-        return min(side, DRAFT_SIDE) if settings.draft else side
+    def sides(self, settings: Settings) -> tuple[int, int]:
+        """Texels along each side of the pattern: the least and the most."""
+        side = settings.get(self, "side")
+        found = (LEAST_SIDE, MOST_SIDE) if side == AUTO else (int(side), int(side))
+        return tuple(min(one, DRAFT_SIDE) for one in found) if settings.draft else found
 
     def show(self, frame: Frame) -> None:
         frame.provide(self._service)

@@ -130,7 +130,13 @@ class TemporalGlare(Technique):
         measured = scatter.measure(picture, white)
         frame.count(self, "passes", scatter.measure_passes(picture))
         aperture = service.aperture(frame, luminance * measured.mean)
-        scale = service.scale(frame, aperture, factor * _pixel_angle(frame), magnification)
+
+        def is_seen(scale: Scale) -> bool:
+            # Light falls as one over the distance to the third, so that the rim has this share of the mean.
+            rim = 0.5 * scale.core / max(scale.reach, scale.core)
+            return rim * veil(measured, aperture, scale, strength, factor) > LEAST_VEIL * white
+
+        scale = service.scale(frame, aperture, factor * _pixel_angle(frame), magnification, is_seen)
         reason = needless(measured, aperture, scale, strength, white, factor)
         if reason and aperture.light == 1.0:
             return self._unseen(frame, reason)
@@ -163,14 +169,19 @@ def needless(
     """Why nobody would see glare, as a sentence; None where somebody may."""
     if measured.most < LEAST_CONTRAST * white or measured.excess == 0.0:
         return f"no pixel is {LEAST_CONTRAST:.0f} times as bright as white"
+    dimmest = veil(measured, aperture, scale, strength, factor)
+    if dimmest < LEAST_VEIL * white:
+        return f"its veil would be {dimmest / max(white, 1e-30):.1e} of white, below half a step of a display"
+    return None
+
+
+def veil(measured: scatter.Brightness, aperture: Aperture, scale: Scale, strength: float, factor: int) -> float:
+    """Mean radiance that bright pixels lay over the kernel's disc."""
     # By Babinet's principle the share of light that leaves the straight way is that of the pupil that is covered; the
     # pupil's edge diffracts 2 / (pi x) of it beyond the core, x in units of the Airy disc's first zero over 3.83.
     edge = 2.0 / (np.pi * 3.83 * max(scale.core * scale.per_pixel / (12.2 / aperture.diameter), 1.0))
     tail = min(strength * (aperture.obstructed + edge), 1.0)
-    veil = tail * measured.excess / (np.pi * (factor * scale.reach) ** 2)
-    if veil < LEAST_VEIL * white:
-        return f"its veil would be {veil / max(white, 1e-30):.1e} of white, below half a step of a display"
-    return None
+    return tail * measured.excess / (np.pi * (factor * scale.reach) ** 2)
 
 
 def _pixel_angle(frame: Frame) -> float:

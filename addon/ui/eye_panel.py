@@ -105,7 +105,7 @@ def pictures(scene, depsgraph, whole: bool = True) -> tuple[np.ndarray, np.ndarr
     seconds = scene.frame_current_final * render.fps_base / render.fps * settings.get(technique, "speed")
     # Nothing was measured here: the picture's own mean may differ, and with it an automatic pupil.
     aperture: Aperture = aperture_at(eye, seconds, settings.get(glare, "luminance") * 0.18)
-    side, defocus = technique.side(settings), settings.get(technique, "defocus")
+    side, defocus = technique.sides(settings)[0], settings.get(technique, "defocus")
     scale = optics.scale_of(
         side, degrees_per_pixel(camera, width, height), settings.get(glare, "magnification"), aperture.diameter,
         defocus, max(width, height),

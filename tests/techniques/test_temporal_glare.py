@@ -1,5 +1,6 @@
 """Temporal glare in rendered pictures: when it runs, what it leaves as it is, and that time alone decides its state."""
 
+import bpy
 import numpy as np
 import pytest
 
@@ -73,6 +74,22 @@ def _point_spread():
     from addon.techniques.eye import PointSpread
 
     return PointSpread
+
+
+def test_the_pattern_grows_until_nobody_sees_its_rim(night):
+    """By itself it is small before faint lamps and large before ones that are 200,000 times as bright."""
+    settings = night.scene.camera.data.candela
+    settings.eye_side, settings.glare_magnification = "AUTO", 10.0
+    sides = []
+    for strength in (20.0, 4e6):
+        for material in bpy.data.materials:
+            for node in material.node_tree.nodes:
+                if node.type == "EMISSION":
+                    node.inputs["Strength"].default_value = strength
+        night.render(size=SIZE)
+        assert glare_row(night).state == RAN
+        sides.append(night.renderer.frame.service(_point_spread())._kernel[1].scale.side)
+    assert sides[0] == 512 < sides[1]
 
 
 def test_a_picture_without_bright_light_is_left_to_the_bit_and_no_transform_compiled(night):
