@@ -13,13 +13,14 @@ from ..frame.technique import SCENE, identifier
 from ..techniques import REGISTRY
 from . import ENGINE, blender_panels, notes, pass_panels
 from .passes import PASSES
-from .properties import slots, titled
+from .properties import titled
 from .quality import CANDELA_PT_quality_presets
+from .technique_groups import GROUPS, OTHERS, Group, group_of, is_expert, members
 from .texts import wrapped
 
 TAB_S, TAB_TRIES = 0.05, 40  # between tries to show a tab that the editor may not have yet, and how many
 MOST_NOTES = 12  # more than these are counted only
-_PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else they stand in Parameters
+_PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else in their group
 # Bounces by kind of light, as far as techniques limit them themselves.
 _BOUNCES = (
     ("shaded_reflections", "bounces", "Glossy"),
@@ -107,35 +108,61 @@ class CANDELA_RENDER_PT_simplify(_CandelaPanel, bpy.types.Panel):
 
 
 class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):
-    bl_label = "Techniques"
+    """Which passes make a picture, and settings for a given time"""
 
-    def draw(self, context):
-        column = _columns(self)
-        for slot in slots():
-            row = column.row()
-            row.active = context.scene.candela.pass_tree is None  # a tree decides by its nodes
-            row.prop(context.scene.candela, f"slot_{slot}")
-        column.prop(context.scene.candela, "pass_tree")
-
-
-class CANDELA_RENDER_PT_parameters(_CandelaPanel, bpy.types.Panel):
-    """What the techniques may be told; the presets of Sampling set all of it"""
-
-    bl_label = "Parameters"
-    bl_parent_id = "CANDELA_RENDER_PT_techniques"
+    bl_label = "Performance"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
+        _columns(self).prop(context.scene.candela, "pass_tree")
+
+
+def _group_panels(group: Group) -> list[type]:
+    """The panel of a group with a choice for each of its slots, and below it the part for its techniques."""
+
+    def draw(self, context):
+        column = _columns(self)
+        column.active = context.scene.candela.pass_tree is None  # a tree decides by its nodes
+        for slot, text in group.slots:
+            column.prop(context.scene.candela, f"slot_{slot}", text=text)
+
+    def nothing(self, context):
         pass
+
+    name = f"CANDELA_RENDER_PT_group_{group.name}"
+    made = [
+        (name, {"bl_label": group.label, "draw": draw}),
+        (f"{name}_advanced", {"bl_label": "Advanced", "bl_parent_id": name, "draw": nothing}),
+    ]
+    common = {"__module__": __name__, "bl_options": {"DEFAULT_CLOSED"}}
+    return [type(name, (_CandelaPanel, bpy.types.Panel), common | body) for name, body in made]
+
+
+def _shows_expert(context) -> bool:
+    """What the extension's preferences say; everything where Candela is no extension."""
+    own = getattr(context.preferences, "addons", {}).get(__package__.rpartition(".")[0])
+    return own is None or getattr(own.preferences, "show_expert", True)
+
+
+def _reason_skipped(technique) -> str:
+    """Why the last picture did without a technique; empty where it did not."""
+    rows = (row for row in _rows() if row.name == technique.name and row.state == ledgers.SKIPPED)
+    return next((row.reason for row in rows), "")
 
 
 def _technique_panel(technique) -> type:
-    """The sub-panel with a technique's parameters; it is gone while its slot holds another technique."""
+    """The sub-panel with a technique's parameters; it is gone while its slot holds another technique, or where all that
+    it has is for experts. It is grey, and says why, where the last picture did without the technique."""
+
+    def shown(context) -> list:
+        experts = _shows_expert(context)
+        return [param for param in technique.params_of(SCENE) if experts or not is_expert(param)]
 
     @classmethod
     def poll(cls, context):
         chosen = {getattr(context.scene.candela, f"slot_{slot}") for slot in technique.fills} or {technique.name}
-        return _CandelaPanel.poll.__func__(cls, context) and not chosen.isdisjoint((AUTO, technique.name))
+        asked = not chosen.isdisjoint((AUTO, technique.name)) and bool(shown(context))
+        return _CandelaPanel.poll.__func__(cls, context) and asked
 
     def draw(self, context):
         column = _columns(self)
@@ -143,14 +170,18 @@ def _technique_panel(technique) -> type:
             switches = column.column(align=True, heading="Denoise")
             switches.prop(context.scene.candela, "use_denoise", text="Render")
             switches.prop(context.scene.candela, "use_viewport_denoise", text="Viewport")
-        for param in technique.params_of(SCENE):
+        reason = _reason_skipped(technique)
+        if reason:
+            wrapped(column, context, reason, dim=True)
+        column.active = not reason
+        for param in shown(context):
             column.prop(context.scene.candela, identifier(technique.name, param.name))
 
     body = {
         "__doc__": f"Parameters of {technique.label}",
         "__module__": __name__,
         "bl_label": titled(technique.label),
-        "bl_parent_id": _PARENTS.get(technique.name, "CANDELA_RENDER_PT_parameters"),
+        "bl_parent_id": _PARENTS.get(technique.name, f"CANDELA_RENDER_PT_group_{group_of(technique).name}_advanced"),
         "bl_options": set() if technique.name in _PARENTS else {"DEFAULT_CLOSED"},
         "poll": poll,
         "draw": draw,
@@ -526,21 +557,27 @@ def _draw_pause(self, context):
         self.layout.prop(context.scene.candela, "viewport_pause", icon="PLAY" if paused else "PAUSE", text="")
 
 
+def _panels_of_groups() -> list[type]:
+    """The panels of all groups that hold something, each before those below it."""
+    made = []
+    for group in (*GROUPS, OTHERS):
+        own = [one for one in members(group) if one.name not in {*_WITH_OTHERS, *_PARENTS}]
+        if group.slots or own:
+            made += [*_group_panels(group), *map(_technique_panel, own)]
+    return made
+
+
 _CLASSES = (
     CANDELA_OT_select_culprit,
     CANDELA_RENDER_PT_frame_notes,  # first: panels stand in this order
     CANDELA_RENDER_PT_sampling,
     CANDELA_RENDER_PT_light_paths,
-    CANDELA_RENDER_PT_techniques,
-    CANDELA_RENDER_PT_parameters,
-    *(
-        _technique_panel(technique)
-        for technique in REGISTRY
-        if technique.params_of(SCENE) and technique.name not in _WITH_OTHERS
-    ),
+    *(_technique_panel(technique) for technique in REGISTRY if technique.name in _PARENTS),
+    *_panels_of_groups(),
     CANDELA_RENDER_PT_film,
     CANDELA_RENDER_PT_motion_blur,
     CANDELA_RENDER_PT_motion_blur_curve,
+    CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_simplify,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_skipped,

@@ -1,4 +1,5 @@
-"""The extension's preferences: what this device was measured to do, by which Candela chooses between methods."""
+"""The extension's preferences: what this device was measured to do, by which Candela chooses between methods, and
+which settings are shown."""
 
 from __future__ import annotations
 
@@ -29,8 +30,14 @@ class CANDELA_OT_measure_device(bpy.types.Operator):
 class CandelaPreferences(bpy.types.AddonPreferences):
     bl_idname = __package__.rpartition(".")[0]  # the extension's own name
 
+    show_expert: bpy.props.BoolProperty(
+        name="Show Expert Settings",
+        description="Show parameters of techniques that trade one error for another, in the parts Advanced",
+    )
+
     def draw(self, _context):
         column = self.layout.column()
+        column.prop(self, "show_expert")
         for line in device_lines():
             column.label(text=line)
         self.layout.operator(CANDELA_OT_measure_device.bl_idname, icon="FILE_REFRESH")

@@ -12,7 +12,7 @@ from addon.frame.technique import SCENE, identifier
 from addon.snapshot.scene import Note
 from addon.techniques import REGISTRY
 from addon.techniques.denoise import Denoise
-from addon.ui import ENGINE, blender_panels, notes, panels
+from addon.ui import ENGINE, blender_panels, notes, panels, technique_groups
 from addon.ui.pass_tree import TREE
 from addon.ui.passes import PASSES, wanted_passes
 from addon.ui.properties import _SMALL as SMALL
@@ -81,6 +81,8 @@ def published():
 
 def test_every_slot_and_parameter_has_a_place(scene):
     shown = drawn(panels.CANDELA_RENDER_PT_techniques)
+    for group in technique_groups.GROUPS:
+        shown += drawn(getattr(bpy.types, f"CANDELA_RENDER_PT_group_{group.name}"))
     for technique in REGISTRY:
         if technique.params_of(SCENE):
             shown += drawn(getattr(bpy.types, f"CANDELA_RENDER_PT_{technique.name}"))
@@ -91,6 +93,32 @@ def test_every_slot_and_parameter_has_a_place(scene):
         + [f"slot_{slot}" for slot in slots()]
         + [identifier(t.name, p.name) for t in REGISTRY for p in t.params_of(SCENE)]
     )
+
+
+def of_an_artist(shows_expert=False):
+    """A context whose preferences show settings for experts, or not."""
+    own = SimpleNamespace(preferences=SimpleNamespace(show_expert=shows_expert))
+    return {"preferences": SimpleNamespace(system=SimpleNamespace(ui_scale=1.0), addons={"addon": own})}
+
+
+def test_half_of_the_parameters_are_for_experts(scene):
+    made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params_of(SCENE)}
+    everything = [name for panel in made.values() for name in drawn(panel, **of_an_artist(True))]
+    few = [name for panel in made.values() for name in drawn(panel, **of_an_artist())]
+    assert set(few) < set(everything) and 0.4 < len(few) / len(everything) < 0.65
+    assert not made[next(t for t in made if t.name == "accumulated_maps")].poll(Context(**of_an_artist()))
+
+
+def test_what_the_last_picture_did_without_says_why(scene, published):
+    published(ledger.Ledger([ledger.Row("vssm", "Variance", ledger.SKIPPED, "no light has a size")]))
+    assert any("no light has a size" in text for text in drawn(bpy.types.CANDELA_RENDER_PT_vssm))
+
+
+def test_groups_stand_in_the_order_of_an_artists_work(scene):
+    order = [panel.bl_label for panel in panels._CLASSES if getattr(panel, "bl_parent_id", "") == ""]
+    labels = [group.label for group in technique_groups.GROUPS]
+    assert [label for label in order if label in labels] == labels
+    assert order.index("Sampling") < order.index(labels[0]) < order.index("Film") < order.index("Performance")
 
 
 def test_parameters_are_those_of_the_techniques_in_question(scene):
