@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
+from statistics import median
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from .ui.passes import CAMERA_AXES, CATCHER, GLARE, RenderPass
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 TAIL = 0.5  # the same, about
+FEW_SAMPLES, MANY_SAMPLES = 4, 12
 TELL_S = 0.5  # between two sentences about one sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
 SHOW_SHARE = 0.04  # of the render's time, at most, that is spent on showing it
@@ -220,7 +222,7 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
         limit = passed + max(limit - passed, 0.0) / share.left
     wanted, first, before = frame.settings.samples_to_draw, time.perf_counter(), frame.samples_done
     shown, showing, next_picture = -1, 0.0, first + SHOW_S
-    pace, inside = SamplePace(first), Inside(frame, wanted, first)
+    pace, inside = SamplePace(first, wanted), Inside(frame, wanted, first)
     meter = NoiseMeter(frame.settings.noise_threshold) if frame.settings.noise_threshold else None
     for _ in order.parts(renderer, frame):
         if frame.samples_done == shown:
@@ -260,24 +262,28 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
 
 
 class SamplePace:
-    """What a sample takes, learned while a picture is drawn. The first one prepares much that the others find there: of
-    it alone counts what is not compiling, and nothing once another one is done."""
+    """What a sample takes, learned while a picture is drawn. The first ones prepare what the others find there: the
+    first tells nothing, but of pictures that have few samples, and of the others the median counts."""
 
-    def __init__(self, now: float):
-        self._begun = now, library.compile_seconds
-        self._first: tuple[int, float] | None = None
-        self.each: float | None = None  # seconds; None before the first sample
+    def __init__(self, now: float, wanted: int):
+        self._begun, self._wanted = (now, library.compile_seconds), wanted
+        self._last: tuple[int, float] | None = None
+        self._took: list[float] = []  # seconds of a sample, without the first ones
+        self.each: float | None = None  # seconds; None before that is known
 
     def learn(self, done: int, now: float) -> None:
         """So many samples of this picture are done."""
-        if done <= 0:
+        if done <= 0 or (self._last is not None and done <= self._last[0]):
             return
-        if self._first is None:
-            self._first = done, now
+        if self._last is None:
             compiling = library.compile_seconds - self._begun[1]
-            self.each = max(now - self._begun[0] - compiling, 0.0) / done
-        elif done > self._first[0]:
-            self.each = (now - self._first[1]) / (done - self._first[0])
+            if done > 1 or self._wanted <= FEW_SAMPLES:
+                self.each = max(now - self._begun[0] - compiling, 0.0) / done
+        else:
+            self._took.append((now - self._last[1]) / (done - self._last[0]))
+            if len(self._took) > (self._wanted > MANY_SAMPLES):
+                self.each = median(self._took)
+        self._last = done, now
 
 
 class Inside:
