@@ -73,6 +73,7 @@ class Program:
     snippets: tuple[tuple[str, str], ...] = ()
     group: tuple[int, int, int] = (8, 8, 1)
     writes_depth: bool = False  # the fragment shader sets gl_FragDepth
+    leaves_out: tuple[tuple[str, str], ...] = ()  # interfaces (gfx/interface.py) that it does not ask, and why
 
     def __post_init__(self):
         for kind, name in self.textures:

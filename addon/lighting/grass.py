@@ -1,16 +1,15 @@
-"""The service of grass patches: passes that light surfaces look up in their table what grass reflects.
-
-A pass is compiled with `grown`, which adds the table and GRASS to it. Without grass nothing of this is compiled.
+"""The service of grass patches: passes that light surfaces look up in their table what grass reflects (ask/grass.glsl).
+Without grass nothing of this is compiled.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass
 
+from ..frame.picture import Frame
 from ..frame.technique import Service
 from ..gfx import images
-from ..gfx.library import Program
+from ..gfx.interface import Interface
 
 TABLE = ("RGBA16F", "grass_table")
 
@@ -24,14 +23,13 @@ class GrassTable(Service):
 
     @property
     def bindings(self) -> dict[str, images.Image]:
-        """Textures of passes made by `grown`."""
+        """Textures of GRASS."""
         return {TABLE[1]: self.image}
 
 
-@cache
-def grown(program: Program) -> Program:
-    """The same pass for a scene with grass."""
-    return replace(
-        program, name=f"{program.name}, grass", textures=(*program.textures, TABLE),
-        defines=(*program.defines, ("GRASS", "1")),
-    )  # fmt: skip
+def _table(frame: Frame) -> dict[str, images.Image] | None:
+    service = frame.service(GrassTable)
+    return None if service is None else service.bindings
+
+
+GRASS = Interface("grass", "grass/light.glsl", (TABLE,), _table)

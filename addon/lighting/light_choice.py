@@ -28,9 +28,10 @@ from dataclasses import replace
 
 from ..frame.picture import Frame
 from ..gfx import images, passes
+from ..gfx.interface import answered
 from ..gfx.library import Program
 from ..kernels import ordered_lists
-from .media import MediaService, attenuated
+from .media import MEDIA, MediaService
 
 GROUP = 16  # candidates that share the next surfaces of their paths
 FLOOR = 1.0  # share of the mean importance that every candidate keeps
@@ -86,7 +87,8 @@ SLOTS = _pass(
 
 NEXT_POINT = ("RGBA32F", "next_point")
 ALONE_IN_MEDIA, SHARED_IN_MEDIA = (
-    attenuated(replace(program, textures=(*program.textures, NEXT_POINT))) for program in (ALONE, SHARED)
+    answered(replace(one, textures=(*one.textures, NEXT_POINT), defines=(*one.defines, ("PLACES", "1"))), (MEDIA,))
+    for one in (ALONE, SHARED)
 )
 
 

@@ -2,13 +2,13 @@
 
 Groups stand in the instance image (snapshot/linking.py) and groups that a light does not light beside its kind
 (sources/lights.py). Where any light of a pass has such bits, surfaces are drawn once more in the sample, with the
-numbers of their instances in the place of where they lie, and the pass asks for them. Scenes without links compile and
-draw nothing of this.
+numbers of their instances in the place of where they lie, whose groups the pass asks for (ask/links.glsl). Scenes
+without links compile and draw nothing of this.
 
 | cost | per sample with linked lights |
 |---|---|
-| passes | 1 of surfaces and a copy, and a fetch more per pixel in each linked pass |
-| memory | 7 images while it draws, 1 that stays: 16 bytes a pixel each |
+| passes | 1 of surfaces and 1 of groups, and a fetch more per pixel in each linked pass |
+| memory | 7 images of 16 bytes a pixel while it draws, 1 of 4 that stays |
 
 Not followed: light that reaches a surface by way of others, through glass, or in a volume; emissive meshes in mirrors.
 """
@@ -16,19 +16,29 @@ Not followed: light that reaches a surface by way of others, through glass, or i
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import replace
 
 import numpy as np
 
 from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
+from ..gfx.interface import Interface, answered
 from ..gfx.library import Program
 from ..sources import lights
 from ..surfaces.draw import SURFACES, draw_indices
 from . import repeated_light
 
-GROUPS = "surface.object"
+GROUPS = "surface.group"
+FIND_GROUPS = passes.fullscreen_program(
+    "groups of receivers",
+    "light/groups.frag.glsl",
+    textures=(("RGBA32F", "surface_object"), ("RGBA32F", "instances")),
+    defines=(("VISIBILITY_FLAG", "FLAG_CAMERA"),),
+    outputs=(("FLOAT", "out_group"),),
+)
+
+
+LINKS = Interface("links", "light/links.glsl", (("R32F", "receiver_groups"),), lambda frame: None)  # by `linked`
 
 
 def has_links(rows: list[np.ndarray]) -> bool:
@@ -36,13 +46,20 @@ def has_links(rows: list[np.ndarray]) -> bool:
     return any(int(row[0, 0]) >= lights.KIND_STEPS for row in rows)
 
 
-def linked(program: Program) -> Program:
-    """The same pass for lights that leave out receivers."""
-    return replace(
-        program, name=f"{program.name}, linked",
-        textures=(*program.textures, ("RGBA32F", "surface_object"), ("RGBA32F", "instances")),
-        defines=(*program.defines, ("LIGHT_LINKS", "1")),
-    )  # fmt: skip
+def linked(
+    frame: Frame, technique: Technique, program: Program, rows: list[np.ndarray], textures: dict[str, images.Image]
+) -> Program:
+    """The same pass for what these lights, (TEXELS, 4) each, leave out of what the camera sees in this sample. The
+    image of groups is added to `textures`."""
+    if not has_links(rows):
+        return program
+    textures["receiver_groups"] = frame.shared(Groups).image(frame, technique)
+    return answered(program, (LINKS,))
+
+
+def find_groups(frame: Frame, numbers: images.Image, groups: images.Target) -> None:
+    """From the numbers of instances (z: rows of the geometry's image) their groups of receivers."""
+    passes.fullscreen(FIND_GROUPS, groups, textures={"surface_object": numbers, "instances": frame.geometry.instances})
 
 
 class Groups:
@@ -51,18 +68,18 @@ class Groups:
     def __init__(self):
         self._sample = -1
 
-    def bindings(self, frame: Frame, technique: Technique) -> dict[str, images.Image]:
+    def image(self, frame: Frame, technique: Technique) -> images.Image:
         """The image of groups of the sample that is running. Its light cannot be repeated at other points."""
         if self._sample != frame.sample:
             self._sample = frame.sample
             if GROUPS not in frame.images:
-                frame.images[GROUPS] = images.pool.take(*frame.size, "RGBA32F")
+                frame.images[GROUPS] = images.pool.take(*frame.size, "R32F")
             with ExitStack() as stack:
                 drawn = [stack.enter_context(images.borrowed(*frame.size, "RGBA32F")) for _ in SURFACES]
                 depth = stack.enter_context(images.borrowed(*frame.size, "DEPTH_COMPONENT32F"))
                 target = images.Target(tuple(one.colors[0] for one in drawn), depth.colors[0])
                 draw_indices(frame, technique, target)
-                passes.copy(drawn[0].colors[0], frame.target(GROUPS))
+                find_groups(frame, drawn[0].colors[0], frame.target(GROUPS))
             frame.count(technique, "passes", 2)
         repeated_light.forbid(frame)
-        return {"surface_object": frame.images[GROUPS], "instances": frame.geometry.instances}
+        return frame.images[GROUPS]

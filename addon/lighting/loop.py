@@ -28,7 +28,8 @@ import numpy as np
 
 from ..frame.picture import Frame
 from ..frame.technique import Technique, Write
-from ..gfx import passes
+from ..gfx import images, passes
+from ..gfx.interface import answer
 from ..gfx.library import Program
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -36,8 +37,8 @@ from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
 from . import linked, repeated_light, shared_visibility
 from .caustic_casters import glass_alone
-from .grass import GrassTable, grown
-from .media import MediaService, attenuated
+from .grass import GRASS
+from .media import MEDIA
 from .repeated_light import Lit
 from .visibility import (
     RAY_CONSTANTS,
@@ -100,34 +101,19 @@ def shade(
     """Add the light of `rows` (each (TEXELS, 4)), of these `kinds`, to the radiance images, in
     parts."""
     drawn = {} if maps.atlas is None else {"depth_maps": maps.atlas}
-    bindings = {
-        "textures": {**drawn, "energy_table": frame.materials.energy_table, **maps.textures},
-        "blocks": maps.blocks,
-        "constants": {
-            "light_count": len(rows), "traced_roughness": traced_roughness(frame),
-            **maps.constants,
-        },
-    }  # fmt: skip
-    program = lighting(maps.lookup, frame.materials.soft, kinds)
-    grass = frame.service(GrassTable)
-    if grass is not None:
-        program = grown(program)
-        bindings["textures"] |= grass.bindings
-    media = frame.service(MediaService)
-    if media is not None:
-        program = attenuated(program)
-        bindings["textures"] |= media.bindings
-    has_links = linked.has_links(rows)
-    if has_links:
-        program = linked.linked(program)
-        bindings["textures"] |= frame.shared(linked.Groups).bindings(frame, technique)
+
+    def answering(lookup: Lookup, textures: dict[str, images.Image]) -> tuple[Program, dict[str, images.Image]]:
+        """The pass with this lookup for what the scene has, and what it reads then beside the surfaces."""
+        textures = {"energy_table": frame.materials.energy_table, **textures}
+        program, textures = answer(frame, lighting(lookup, frame.materials.soft, kinds), textures, (GRASS, MEDIA))
+        return linked.linked(frame, technique, program, rows, textures), textures
+
+    constants = {"light_count": len(rows), "traced_roughness": traced_roughness(frame), **maps.constants}
+    program, textures = answering(maps.lookup, {**drawn, **maps.textures})
+    bindings = {"textures": textures, "blocks": maps.blocks, "constants": constants}
     lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
     if maps.sparse:
-        between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
-        between = grown(between) if grass is not None else between
-        between = attenuated(between) if media is not None else between
-        between = linked.linked(between) if has_links else between
-        yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, between)
+        yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, answering)
     else:
         yield from repeated_light.add(frame, technique, sources, lit)
         frame.count(technique, "passes")

@@ -1,19 +1,19 @@
 """The service of the media of a scene: what they let pass, for passes that draw light or look along a view.
 
-A pass that asks how much light arrives from somewhere is compiled with `attenuated`, which adds the media's images and
-MEDIA to it, and binds `MediaService.bindings`. Without a medium nothing of this is compiled.
+A pass that asks how much light arrives from somewhere includes ask/media.glsl and is drawn by what `dimmed` makes of
+its program. Without a medium nothing of this is compiled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass
 
 from ..frame.picture import Frame
 from ..frame.technique import Service, Technique
 from ..gfx import images, passes
+from ..gfx.interface import Interface, answered, asked_by
 from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..scene.media import ATTENUATION_TEXTURES, Media
@@ -75,7 +75,7 @@ class MediaService(Service):
 
     @property
     def bindings(self) -> dict[str, images.Image]:
-        """Textures of passes made by `attenuated`."""
+        """Textures of MEDIA."""
         return self.media.attenuation()
 
 
@@ -124,25 +124,24 @@ class LightOfMedia(Service):
     add: Callable[[Frame, Technique, Rays, images.Target], None]
 
 
+def _media(frame: Frame) -> dict[str, images.Image] | None:
+    service = frame.service(MediaService)
+    return None if service is None else service.bindings
+
+
+MEDIA = Interface("media", "media/media.glsl", ATTENUATION_TEXTURES, _media)
+
+
 def dimmed(frame: Frame, program: Program, textures: dict[str, images.Image]) -> Program:
     """The same pass for what media the frame has, whose images are added to `textures`."""
-    service = frame.service(MediaService)
-    if service is None:
+    found = MEDIA.present(frame) if MEDIA.asked in asked_by(program) else None
+    if found is None:
         return program
-    textures |= service.bindings
-    return attenuated(program)
+    textures |= found
+    return answered(program, (MEDIA,))
 
 
 def is_endless(frame: Frame) -> bool:
     """Whether a medium without an end takes all light that comes from infinity."""
     service = frame.service(MediaService)
     return service is not None and service.media.endless
-
-
-@cache
-def attenuated(program: Program) -> Program:
-    """The same pass for a scene with media."""
-    return replace(
-        program, name=f"{program.name} with media", textures=(*program.textures, *ATTENUATION_TEXTURES),
-        defines=(*program.defines, ("MEDIA", "1")),
-    )  # fmt: skip

@@ -26,11 +26,12 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import context, images, passes
+from ..gfx.interface import answered
 from ..gfx.library import Program
 from ..scene import acceleration
 from ..scene.point_tree import COVER
 from ..scene.view import VIEW
-from .media import MediaService, attenuated
+from .media import MEDIA, MediaService
 from .point_runs import CLIPS, ROW, TURN, PointRuns, Run
 
 PULLED = 7  # levels of a pass
@@ -60,11 +61,13 @@ ARRIVING = passes.fullscreen_program(
     constants=(("INT", "micro_side"), ("INT", "id_bits")),
     outputs=(("VEC4", "out_arriving"),),
 )
-ARRIVING_IN_MEDIA = attenuated(
+ARRIVING_IN_MEDIA = answered(
     replace(
-        ARRIVING, textures=(*ARRIVING.textures, BUFFER_TEXTURES[0]), defines=(("NODE_ROW", str(NODE_ROW)),),
+        ARRIVING, textures=(*ARRIVING.textures, BUFFER_TEXTURES[0]),
+        defines=(("NODE_ROW", str(NODE_ROW)), ("PLACES", "1")),
         constants=(*ARRIVING.constants, ("INT", "leaf_count"), ("INT", "group_count"), ("VEC4", "buffer_choice")),
-    )
+    ),
+    (MEDIA,),
 )  # fmt: skip
 SENT = passes.fullscreen_program(
     "light sent by points",

@@ -13,11 +13,13 @@ has several, so that a picture of one sample is smooth.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import numpy as np
 
 from ..frame.picture import Frame
 from ..gfx import images, passes
+from ..gfx.interface import answered
 from ..materials.compiler import may_emit
 from ..sampling.sequence import uniform
 from ..sources import lights
@@ -72,17 +74,20 @@ class PointLight:
         textures, constants = ray_bindings(frame)
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
         program = dimmed(frame, LIGHTING, bound)
-        if instances is not None and linked.has_links(rows):
-            program = linked.linked(program)
-            bound |= {"surface_object": instances, "instances": frame.geometry.instances}
-        for first in range(0, len(rows), lights.MOST_LIGHTS):
-            some = rows[first : first + lights.MOST_LIGHTS]
-            passes.fullscreen(
-                program, target, blend="ADDITIVE_PREMULT",
-                textures={**bound, **textures, "energy_table": frame.materials.energy_table},
-                blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
-                constants={"light_count": len(some), "traced_roughness": -1.0, **constants},
-            )  # fmt: skip
+        with ExitStack() as stack:
+            if instances is not None and linked.has_links(rows):
+                groups = stack.enter_context(images.borrowed(instances.width, instances.height, "R32F"))
+                linked.find_groups(frame, instances, groups)
+                program = answered(program, (linked.LINKS,))
+                bound["receiver_groups"] = groups.colors[0]
+            for first in range(0, len(rows), lights.MOST_LIGHTS):
+                some = rows[first : first + lights.MOST_LIGHTS]
+                passes.fullscreen(
+                    program, target, blend="ADDITIVE_PREMULT",
+                    textures={**bound, **textures, "energy_table": frame.materials.energy_table},
+                    blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
+                    constants={"light_count": len(some), "traced_roughness": -1.0, **constants},
+                )  # fmt: skip
         return -(-len(rows) // lights.MOST_LIGHTS), len(rows)
 
     def _points(self, frame: Frame, least: int) -> int:

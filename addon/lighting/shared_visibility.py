@@ -29,7 +29,7 @@ quantity where it varies little; on a screen grid with silhouettes found by plan
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import cache
 
@@ -177,18 +177,19 @@ def _find(
 
 def add(
     frame: Frame, technique: Technique, sources: lights.Sources, lit: repeated_light.Lit, kinds: int, maps: Maps,
-    between: Program,
+    answering: Callable[[Lookup, dict[str, images.Image]], tuple[Program, dict[str, images.Image]]],
 ) -> Iterator[None]:  # fmt: skip
-    """Add this light to the sample's radiance, in parts, by the program `between`, with the lookup BETWEEN, and keep it
-    for other points of the film, which ask `maps` themselves."""
+    """Add this light to the sample's radiance, in parts, and keep it for other points of the film, which ask `maps`
+    themselves. `answering`: the pass of light with a lookup, and all that it reads beside the surfaces."""
     many = min(LIGHTS, max(images.most_side() // frame.size[1], 1))  # one above the other in an image
     for first in range(0, len(lit.rows), many):
         some = lit.rows[first : first + many]
         found = images.pool.take(frame.size[0], frame.size[1] * len(some), FOUND[0])
         try:
             yield from _find(frame, technique, some, kinds, sources, maps, found)
+            between, textures = answering(BETWEEN, {FOUND[1]: found})
             known = {
-                "textures": {"energy_table": frame.materials.energy_table, FOUND[1]: found},
+                "textures": textures,
                 "blocks": {},
                 "constants": {
                     "light_count": len(some), "traced_roughness": lit.bindings["constants"]["traced_roughness"]

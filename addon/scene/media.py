@@ -39,8 +39,15 @@ MOST_MEDIA = 30
 MEDIUM_TEXELS = 10  # layout in shaders/media/media.glsl
 LARGEST_COEFFICIENT, LARGEST_EMISSION = 1e10, 1e20  # per metre: what float32 can still multiply by distances
 MOST_CELLS = 2**23  # of all grids
-MEDIA_TEXTURES = tuple(("RGBA32F", f"media_{name}") for name in ("table", "extinction", "scattering", "emission"))
-ATTENUATION_TEXTURES = MEDIA_TEXTURES[:2]  # what asks for transmittance alone reads these
+MEDIA_TEXTURES = tuple(("RGBA32F", f"media_{name}") for name in ("table", "scattering", "emission"))
+ATTENUATION_TEXTURES = MEDIA_TEXTURES[:1]  # what asks for transmittance alone reads these
+JOIN = passes.fullscreen_program(
+    "list of media and extinction",
+    "media/join.frag.glsl",
+    textures=(("RGBA32F", "media_list"), ("RGBA32F", "extinction")),
+    constants=(("INT", "first_row"),),
+    outputs=(("VEC4", "out_texel"),),
+)
 PLACE = Struct(
     "MediumPlace",
     *(("vec4", f"cell_{axis}") for axis in "xyz"),  # from a cell's coordinates to a place relative to the origin
@@ -267,6 +274,7 @@ class Media:
     notes: tuple[Note, ...] = ()
     textures: dict[str, images.Image] = field(default_factory=dict)
     cells: int = 0
+    first_row: int = 0  # of the cells' extinction in the image of the table
     _key: object = None
 
     @property
@@ -330,6 +338,9 @@ class Media:
             }
         # Bit 0 is the world's: without one, the first number stays free.
         first = 0 if self.found and self.found[0].corners is None else 1
+        tree = self._boundaries(first)
+        nodes, leaves = tree.boxes.rows.reshape(-1, 4), tree.leaves.reshape(-1, 4)
+        self.first_row = -(-(len(table) + len(nodes) + len(leaves)) // images.LIST_WIDTH)
         rows, self.cells = 0, 0
         jobs = []
         for k, one in enumerate(self.found):
@@ -339,17 +350,16 @@ class Media:
                 size = sizes[k]
                 inverse = np.linalg.inv(np.vstack([one.to_world, (0, 0, 0, 1)]))[:3] * np.array(size)[:, None]
                 row[4:7] = inverse
-                row[7] = *size, rows
+                row[7] = *size, self.first_row + rows
                 row[8, 0] = min(np.linalg.norm(one.to_world[:, axis]) / size[axis] for axis in range(3))
+                row[8, 1] = self.first_row
                 row[0, 3] = 1.0
                 jobs.append((one, size, rows))
                 rows += -(-int(np.prod(size)) // images.LIST_WIDTH)
                 self.cells += int(np.prod(size))
-        notes += self._bake(jobs, rows, snapshot, origin)
-        tree = self._boundaries(first)
-        nodes = tree.boxes.rows.reshape(-1, 4)
         table[-1, 0] = images.LIST_WIDTH + len(nodes)  # where the leaves begin
-        self.textures["media_table"] = images.upload_list(np.concatenate([table, nodes, tree.leaves.reshape(-1, 4)]))
+        listed = images.upload_list(np.concatenate([table, nodes, leaves]))
+        notes += self._bake(jobs, rows, listed, snapshot, origin)
         self.textures["media_table"].defines = (
             *((("MEDIA_WORLD", "1"),) if first == 0 else ()),
             *((("MEDIA_BOUNDED", "1"),) if any(one.corners is not None for one in self.found) else ()),
@@ -365,13 +375,15 @@ class Media:
         look[:, 4] = np.concatenate([np.full(len(c), k) for k, c in bounded]) if bounded else 0.0
         return Tree(corners.astype(np.float32), look)
 
-    def _bake(self, jobs: list, rows: int, snapshot: Snapshot, origin: np.ndarray) -> list[Note]:
+    def _bake(
+        self, jobs: list, rows: int, listed: images.Image, snapshot: Snapshot, origin: np.ndarray
+    ) -> list[Note]:  # fmt: skip
+        """Evaluate what varies; `listed`: table and boundaries, above which its extinction comes to stand."""
         notes: list[Note] = []
-        names = ("media_extinction", "media_scattering", "media_emission")
         side = (images.LIST_WIDTH, rows) if rows else (1, 1)
-        for name in names:
-            self.textures[name] = images.create(*side, "RGBA32F")
-        target = images.Target(tuple(self.textures[name] for name in names))
+        extinction, scattering, emission = (images.create(*side, "RGBA32F") for _ in range(3))
+        self.textures |= {"media_table": listed, "media_scattering": scattering, "media_emission": emission}
+        target = images.Target((extinction, scattering, emission))
         if not rows:
             target.clear()
         for one, size, row in jobs:
@@ -407,6 +419,12 @@ class Media:
                     ),
                 },
                 constants={"grid": (*(int(x) for x in size), row)},
+            )  # fmt: skip
+        if rows:
+            self.textures["media_table"] = images.create(images.LIST_WIDTH, self.first_row + rows, "RGBA32F")
+            passes.fullscreen(
+                JOIN, images.Target((self.textures["media_table"],)),
+                textures={"media_list": listed, "extinction": extinction}, constants={"first_row": self.first_row},
             )  # fmt: skip
         return notes
 

@@ -35,7 +35,6 @@ from ..frame.technique import Param, Technique
 from ..lighting import shared_visibility
 from ..lighting.caustic_casters import answered
 from ..lighting.light_rates import LightRates, PointsDrawn, rate_of
-from ..lighting.linked import linked
 from ..lighting.loop import DIRECT_WRITES, NEAR, RAYS_WHERE_NEAR, light_surfaces, lighting
 from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, ShadowLinks, VisibilityProvider
 from ..scene import acceleration
@@ -49,7 +48,6 @@ LIGHTING = tuple(
     for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS, shared_visibility.BETWEEN)
     for soft_lobes in (False, True)
 )
-LINKED_LIGHTING = tuple(linked(lighting(lookup, True)) for lookup in (HARD, EDGES, RAYS))
 
 
 class DirectLight(Technique):

@@ -40,9 +40,10 @@ from ..frame.run import lights_key
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
+from ..gfx.interface import answered
 from ..gfx.library import Program
 from ..lighting import surfels as surfel_light
-from ..lighting.media import MediaService, attenuated, dimmed
+from ..lighting.media import MEDIA, MediaService, dimmed
 from ..lighting.surfels import SurfelLight
 from ..lighting.virtual_lights import VirtualLights
 from ..scene import acceleration
@@ -89,14 +90,18 @@ PULL = passes.fullscreen_program(
 GATHER = passes.fullscreen_program(
     "bounce between surfels",
     "implicit_visibility/gather.frag.glsl",
-    textures=(("R32F", "links"), ("RGBA32F", "node_radiance"), ("RGBA32F", "reflectance"), ("RGBA32F", "direct")),
+    textures=(("R32F", "bin_links"), ("RGBA32F", "node_radiance"), ("RGBA32F", "reflectance"), ("RGBA32F", "direct")),
     constants=(("INT", "receiver_count"), ("INT", "bins")),
     defines=WIDE,
     outputs=(("VEC4", "out_arriving"), ("VEC4", "out_sent")),
 )
-GATHER_IN_MEDIA = attenuated(
-    replace(GATHER, textures=(*GATHER.textures, *TREE, ("RGBA32F", "receivers")), defines=(*GATHER.defines, *IN_TREE))
-)
+GATHER_IN_MEDIA = answered(
+    replace(
+        GATHER, textures=(*GATHER.textures, *TREE, ("RGBA32F", "receivers")),
+        defines=(*GATHER.defines, *IN_TREE, ("PLACES", "1")),
+    ),
+    (MEDIA,),
+)  # fmt: skip
 SHOW = passes.fullscreen_program(
     "light of surfels at pixels",
     "implicit_visibility/show.frag.glsl",
@@ -249,7 +254,7 @@ class ImplicitVisibility(Technique):
             known = {"reflectance": self._light.reflectance, "direct": direct}
             passes.fullscreen(SEND, images.Target((sent[0],)), textures=known)
             constants = {"receiver_count": surfels.receiver_count, "bins": frame.settings.get(self, "bins")}
-            gather, links = GATHER, {"links": solution.links}
+            gather, links = GATHER, {"bin_links": solution.links}
             if media is not None:
                 gather = GATHER_IN_MEDIA
                 links |= {**_tree(surfels), "receivers": surfels.receivers, **media.bindings}

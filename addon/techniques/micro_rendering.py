@@ -79,7 +79,7 @@ def _regions(listed: bool) -> Program:
         constants=(
             *BUFFER_CONSTANTS, *GRID, *BLOCK, *constants,
         ),
-        defines=(*RUNS, *BUFFER_DEFINES, *(() if listed else (("BY_LEVEL", ""),))),
+        defines=(*RUNS, *BUFFER_DEFINES, ("PLACES", "1"), *(() if listed else (("BY_LEVEL", ""),))),
         group=(lists.RUN, 1, 1),
     )  # fmt: skip
 
@@ -92,7 +92,7 @@ GLOSSY = Program(
     images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
     blocks=((VIEW, "film_view"),),
     constants=(*BUFFER_CONSTANTS, *BLOCK),
-    defines=BUFFER_DEFINES,
+    defines=(*BUFFER_DEFINES, ("PLACES", "1")),
 )
 REFLECTED = passes.fullscreen_program(
     "light of micro-buffers reflected",

@@ -41,7 +41,7 @@ from ..lighting.caustic_maps import CausticMaps
 from ..lighting.interfaces import clear_roughness
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import CANDIDATES
-from ..lighting.media import LightOfMedia, MediaService, Rays, attenuated
+from ..lighting.media import LightOfMedia, MediaService, Rays, dimmed
 from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
@@ -380,10 +380,7 @@ class ShadedReflections(Technique):
         if provided is not None:
             near = {name: provided.bindings["constants"][name] for name in near}
             textures = {name: provided.bindings["textures"][name] for name in textures}
-        program, media = received_program(transmission, frame.materials.soft), frame.service(MediaService)
-        if media is not None:
-            program = attenuated(program)
-            textures |= media.bindings
+        program = dimmed(frame, received_program(transmission, frame.materials.soft), textures)
         passes.fullscreen(
             program,
             self._target(transmission, ("indirect",), records.target.depth),

@@ -35,7 +35,7 @@ from ..gfx import passes
 from ..lighting import linked, repeated_light
 from ..lighting.light_rates import EmissivePoints, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, TRACED_DEFINES
-from ..lighting.media import MediaService, attenuated
+from ..lighting.media import dimmed
 from ..lighting.path_sources import shaded_roughness
 from ..lighting.repeated_light import Lit
 from ..lighting.visibility import TracedLobes
@@ -66,7 +66,6 @@ TRACED = passes.fullscreen_program(
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )  # fmt: skip
-LINKED_TRACED = linked.linked(TRACED)
 
 
 class TracedGlossy(Technique):
@@ -134,13 +133,8 @@ class TracedGlossy(Technique):
                 "glass_bends": int(refracts(frame)),
             },
         }  # fmt: skip
-        program, media = TRACED, frame.service(MediaService)
-        if media is not None:
-            program = attenuated(program)
-            bindings["textures"] |= media.bindings
-        if linked.has_links(self._rows):
-            program = linked.linked(program)
-            bindings["textures"] |= frame.shared(linked.Groups).bindings(frame, self)
+        program = dimmed(frame, TRACED, bindings["textures"])
+        program = linked.linked(frame, self, program, self._rows, bindings["textures"])
         yield from repeated_light.add(frame, self, self._sources, Lit(program, NARROW_LOBE, bindings, self._rows))
         frame.count(self, "passes")
 

@@ -41,7 +41,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.interfaces import clear_roughness, upload_interfaces
-from ..lighting.media import MediaService, attenuated
+from ..lighting.media import MediaService, dimmed
 from ..lighting.path_sources import PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
@@ -74,6 +74,7 @@ REFRACTION = passes.fullscreen_program(
         ("FLOAT", "emissive_points"), ("FLOAT", "clear_roughness"), *NEAR_CONSTANTS,
     ),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
+    leaves_out=(("media", "the walk among means crosses insides of glass, which are no media of the scene"),),
 )  # fmt: skip
 # Where shaded_reflections.py follows what the first interface lets pass, lamps and the world are left:
 FIRST_ALONE = replace(
@@ -82,6 +83,7 @@ FIRST_ALONE = replace(
     textures=tuple(one for one in REFRACTION.textures if one[1] not in BEHIND),
     constants=tuple(one for one in REFRACTION.constants if one not in NEAR_CONSTANTS and one[1] not in EMISSIVE),
     defines=(("FIRST_ALONE", "1"),),
+    leaves_out=(),
 )
 ALBEDO = passes.fullscreen_program(
     "surface albedo",
@@ -156,11 +158,7 @@ class TracedRefraction(Technique):
         if frame.service(ShadedLobes) is None:
             self._walk(frame, bindings)
         else:
-            program, media = FIRST_ALONE, frame.service(MediaService)
-            if media is not None:
-                program = attenuated(program)
-                bindings["textures"] |= media.bindings
-            self._draw(frame, program, bindings)
+            self._draw(frame, dimmed(frame, FIRST_ALONE, bindings["textures"]), bindings)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
 

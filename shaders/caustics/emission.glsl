@@ -1,18 +1,11 @@
 // What a texel of a light's view stands for, and how wide lobes are; `film_view` is the light's view.
-
-#ifdef MEDIA
-#include "media/media.glsl"
-#endif
+#include "ask/media.glsl"
 
 // What media let pass of light along a stretch of a photon's way: with the same random numbers for all photons of a sample,
 // which are one smooth map.
 vec3 passing_media(vec3 origin, vec3 direction, float limit)
 {
-#ifdef MEDIA
   return media_transmittance(origin, direction, min(limit, FARTHEST_MEDIUM), hash3(uvec3(uint(film_view.sample_index), 61u, 0u)).x);
-#else
-  return vec3(1.0);
-#endif
 }
 
 // Flux through a texel at a place that it shows, W: what arrives through media across the light's direction times the texel's area there.

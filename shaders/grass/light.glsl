@@ -3,6 +3,9 @@
 // keep from it is asked for.
 #include "grass/table.glsl"
 
+// Whether layers of depth maps shadow what a pixel shows (lib/shadow.glsl).
+#define LAYERS_SHADE(pixel) (lobe_kind(surface_lobe_fetch(pixel)) != SURFACE_GRASS)
+
 struct GrassSeen {
   bool exists;
   Grass grass;

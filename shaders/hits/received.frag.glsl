@@ -87,10 +87,8 @@ vec3 direct_light(Receiver r, uint salt)
   bool glass_stops = r.bends || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
                  && trace_layers(origin, chosen_direction, reach, reach, salt, glass_stops, true, hit) < reach;
-#ifdef MEDIA
   float through = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
   chosen_light *= blocked ? vec3(0.0) : media_transmittance(origin, chosen_direction, through, salt);
-#endif
   return blocked ? vec3(0.0) : chosen_light * (total / chosen_share);
 }
 

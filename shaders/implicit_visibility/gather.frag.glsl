@@ -2,8 +2,9 @@
 // since bins have equal projected solid angles; and what the receiver sends of it and of the direct light.
 #include "lib/math.glsl"
 #include "implicit_visibility/surfels.glsl"
-#ifdef MEDIA
-#include "media/media.glsl"
+#ifdef PLACES  // of receivers and nodes are bound, between which media lie
+#include "lib/random.glsl"
+#include "ask/media.glsl"
 
 // What media let pass on a link.
 vec3 passing_link(int receiver, int node, int bin)
@@ -31,10 +32,10 @@ void main()
   vec3 sum = vec3(0.0);
   float linked = 0.0;
   for (int bin = 0; bin < count; bin++) {
-    int entry = int(links_fetch(ivec2(first.x + bin, first.y)).x) - 1;
+    int entry = int(bin_links_fetch(ivec2(first.x + bin, first.y)).x) - 1;
     if (entry >= 0) {
       vec3 radiance = node_radiance_fetch(ivec2(entry & 2047, entry >> 11)).rgb;
-#ifdef MEDIA
+#ifdef PLACES
       radiance *= passing_link(receiver, entry >> 1, bin);
 #endif
       sum += radiance;

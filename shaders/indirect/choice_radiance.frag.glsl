@@ -1,9 +1,9 @@
 // Radiance of each candidate, in their order in space; w: luminance of the part that was reflected at least once less than
-// allowed. With PAIRS, what a path brings from its next surface is shared in a group, by the balance heuristic.
+// allowed. With PLACES media lie between candidates and next surfaces. With PAIRS, what a path brings from its next surface is shared in a group, by the balance heuristic.
 // Second: the importance of the candidate, and 1 if it has any.
 #include "indirect/choice.glsl"
-#ifdef MEDIA
-#include "media/media.glsl"
+#ifdef PLACES
+#include "ask/media.glsl"
 #endif
 
 bool all_finite(vec4 v)
@@ -16,7 +16,7 @@ vec4 later_of(int index, int own)
 {
   ivec2 place = candidate_place(index);
   vec4 later = vec4(next_radiance_fetch(place).xyz, candidate_albedo_fetch(place).w);
-#ifdef MEDIA
+#ifdef PLACES
   vec3 origin = candidate_point_fetch(candidate_place(own)).xyz;
   vec3 path = next_point_fetch(place).xyz - origin;
   float reach = length(path);

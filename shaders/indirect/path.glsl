@@ -7,9 +7,7 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
-#ifdef MEDIA  // last: what it includes, too, would be missing where this is left out
-#include "media/media.glsl"
-#endif
+#include "ask/media.glsl"
 
 #define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
 
@@ -152,11 +150,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
 // What media let pass of light that comes along a ray from `limit`.
 vec3 passing_media(vec3 origin, vec3 direction, float limit, uint salt)
 {
-#ifdef MEDIA
   return media_transmittance(origin, direction, min(limit, FARTHEST_MEDIUM), salt);
-#else
-  return vec3(1.0);
-#endif
 }
 
 // Whether the entry that has just raised the `total` to what it is takes the place of the one drawn so far, such that of

@@ -13,9 +13,7 @@
 
 #define VIEW_TEXELS 5
 #include "depth_map/layer.glsl"
-#ifdef GRASS
-#define LAYERS_SHADE(pixel) (lobe_kind(surface_lobe_fetch(pixel)) != SURFACE_GRASS)
-#else
+#ifndef LAYERS_SHADE  // see grass/light.glsl
 #define LAYERS_SHADE(pixel) false
 #endif
 

@@ -16,33 +16,27 @@
 #endif
 #include "light/terminator.glsl"
 #include "light/whole.glsl"
+#include "ask/grass.glsl"
 #include "generated/visibility"
+#include "ask/links.glsl"
+#include "media/light.glsl"
 #ifdef KNOWN_IRRADIANCE
 #include "lib/known_irradiance.glsl"
 #endif
-#ifdef MEDIA
-#include "media/light.glsl"
-#endif
-#ifdef GRASS
-#include "grass/light.glsl"
-#define GRASS_ARGUMENT , grass
-#define GRASS_PARAMETER , GrassSeen grass
-#define DIFFUSE_REFLECTION(s, to_viewer, direction) \
-  (grass.exists ? grass_reflection(grass, s, direction) : surface_diffuse_reflection(s, to_viewer, direction))
-#else
-#define GRASS_ARGUMENT
-#define GRASS_PARAMETER
-#define DIFFUSE_REFLECTION(s, to_viewer, direction) surface_diffuse_reflection(s, to_viewer, direction)
-#endif
+
+vec3 diffuse_reflection(Surface s, GrassSeen grass, vec3 to_viewer, vec3 direction)
+{
+  return grass.exists ? grass_reflection(grass, s, direction) : surface_diffuse_reflection(s, to_viewer, direction);
+}
 
 // Irradiance in closed form times the closure towards the light's middle: exact for Lambert's.
-vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction GRASS_PARAMETER)
+vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction, GrassSeen grass)
 {
   vec3 irradiance = whole_irradiance(light, s.position, s.normal, direction);
   float cosine = dot(s.normal, direction);
   // From a middle below the horizon the part above it shines in along the surface.
   vec3 raised = (cosine > 0.05) ? direction : safe_normalize(direction + s.normal * (0.05 - cosine));
-  vec3 share = DIFFUSE_REFLECTION(s, to_viewer, raised);
+  vec3 share = diffuse_reflection(s, grass, to_viewer, raised);
   return share * irradiance / max(dot(s.normal, raised), 1e-3);
 }
 
@@ -70,9 +64,7 @@ void main()
   }
   Surface s = SURFACE_READ(pixel);
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
-#ifdef GRASS
   GrassSeen grass = grass_see(pixel, s);
-#endif
   bool has_diffuse = max_component(s.diffuse) > 0.0;
   bool has_glossy = s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;
 #ifdef SOFT_LOBES
@@ -85,9 +77,7 @@ void main()
     has_glossy = !lobe_is_mirror(lobe);
   }
   bool traced = s.glossy_roughness <= traced_roughness;
-#ifdef LIGHT_LINKS
   int group = receiver_group(pixel);
-#endif
   vec3 diffuse = vec3(0.0);
   vec3 glossy = vec3(0.0);
 #ifdef KNOWN_IRRADIANCE
@@ -97,11 +87,9 @@ void main()
 #endif
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
-#ifdef LIGHT_LINKS
-    if (((light.unlit >> group) & 1) != 0) {
+    if (light_leaves_out(light, group)) {
       continue;
     }
-#endif
 #ifdef OWN_POINTS
     light = own_point(light, i);
 #endif
@@ -123,7 +111,7 @@ void main()
       towards = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
     }
     if (whole && on_diffuse) {
-      from_diffuse = whole_diffuse(light, s, to_viewer, towards GRASS_ARGUMENT);
+      from_diffuse = whole_diffuse(light, s, to_viewer, towards, grass);
     }
     for (int part = 0; part < parts; part++) {
       Light source = light;
@@ -139,8 +127,7 @@ void main()
       drawn += light.radius * falling;  // openness of its direction
 #endif
       if (on_diffuse && !whole) {
-        from_diffuse += arriving *
-                        DIFFUSE_REFLECTION(s, to_viewer, direction);
+        from_diffuse += arriving * diffuse_reflection(s, grass, to_viewer, direction);
       }
       // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
       towards = whole ? towards : direction;
@@ -173,11 +160,9 @@ void main()
         vec3 start = light_start(s.position, side * s.normal, facing, lift, towards, facing);
         visibility = light_visibility(light, pixel, start, facing);
       }
-#ifdef MEDIA
       vec3 passing = light_through_media(light, pixel, s.position, towards);
       from_diffuse *= passing;
       from_glossy *= passing;
-#endif
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;
 #ifdef KNOWN_IRRADIANCE

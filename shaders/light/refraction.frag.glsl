@@ -12,9 +12,7 @@
 #ifdef ABSORBING
 #include "trace/solid.glsl"
 #endif
-#ifdef MEDIA
-#include "media/media.glsl"
-#endif
+#include "ask/media.glsl"
 #ifndef FIRST_ALONE
 #define PART 256  // virtual lights that a surface behind glass looks at: no filter spreads their noise
 #include "indirect/near.glsl"
@@ -71,10 +69,8 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
   ivec2 hit;
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
                  && trace_layers(origin, kept_direction, reach, reach, salt, true, true, hit) < reach;
-#ifdef MEDIA
   float through = min(light_distance(light, origin, kept_direction), FARTHEST_MEDIUM);
   kept_light *= blocked ? vec3(0.0) : media_transmittance(origin, kept_direction, through, salt);
-#endif
   return blocked ? vec3(0.0) : kept_light * (total / kept_importance);
 }
 
@@ -100,11 +96,9 @@ vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit, b
       nearest = (max_component(abs(radiance)) > 0.0) ? min(nearest, hit_distance) : nearest;
     }
   }
-#ifdef MEDIA
   if (max_component(abs(sum)) > 0.0) {
     sum *= media_transmittance(origin, direction, min(nearest, FARTHEST_MEDIUM), salt);
   }
-#endif
   return sum;
 }
 

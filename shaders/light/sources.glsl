@@ -49,9 +49,7 @@
 
 struct Light {
   int kind;
-#ifdef LIGHT_LINKS
-  int unlit;
-#endif
+  int unlit;  // groups of receivers that it leaves out, a bit each
   int flags;
   int first_view;
   int view_count;
@@ -74,10 +72,8 @@ Light light_read(int index)
   vec4 b = sources.light[light.base + 1];
   vec4 d = sources.light[light.base + 3];
   vec4 e = sources.light[light.base + 4];
-  light.kind = int(a.x) & 15;  // above: groups of receivers that it does not light
-#ifdef LIGHT_LINKS
+  light.kind = int(a.x) & 15;
   light.unlit = int(a.x) >> 4;
-#endif
   light.flags = int(a.y);
   light.first_view = int(a.z);
   light.view_count = int(a.w);
@@ -104,15 +100,6 @@ vec3 light_tree(Light light, vec3 direction, vec3 from, float path)
   return vec3(1.0);
 }
 
-#ifdef LIGHT_LINKS
-// The group of receivers of the object that a pixel shows, from the instance image (lib/instance.glsl).
-int receiver_group(ivec2 pixel)
-{
-  int id = int(surface_object_fetch(pixel).z + 0.5);
-  return int(instances_fetch(ivec2(((id & 255) << 3) + 7, id >> 8)).x + 0.5);
-}
-
-#endif
 // Falloff of a spot for a ray that leaves it along `direction`.
 float spot_attenuation(Light light, vec3 direction)
 {

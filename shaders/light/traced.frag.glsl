@@ -7,10 +7,8 @@
 #include "light/sources.glsl"
 #include "trace/own_solid.glsl"
 #include "trace/rays.glsl"
-
-#ifdef MEDIA
-#include "media/media.glsl"
-#endif
+#include "ask/media.glsl"
+#include "ask/links.glsl"
 
 // Share of the lobe's samples against `light_samples` of density `light_density` (power heuristic, beta = 2).
 float lobe_share(float lobe_density, float light_density, float light_samples)
@@ -38,11 +36,9 @@ vec3 arriving(ivec2 pixel, vec3 origin, vec3 direction, float lobe_density, bool
     if ((light.flags & LIGHT_GLOSSY) == 0) {
       continue;
     }
-#ifdef LIGHT_LINKS
-    if (((light.unlit >> receiver_group(pixel)) & 1) != 0) {
+    if (light_leaves_out(light, receiver_group(pixel))) {
       continue;
     }
-#endif
     float hit_distance;
     float density;
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
@@ -120,10 +116,8 @@ void main()
       float limit = (blocked < kept_span.y) ? blocked : 1e29;
       vec3 light = arriving(pixel, s.position, kept_direction, kept_density, mirror, limit, ignored);
       out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
-#ifdef MEDIA
       float reach = (kept_span.x < 1e28) ? kept_span.x : FARTHEST_MEDIUM;
       out_glossy.rgb *= media_transmittance(origin, kept_direction, reach, salt.x);
-#endif
     }
   }
   if (emissive_power > 0.0 && s.glossy_roughness > shaded_roughness) {
@@ -146,9 +140,7 @@ void main()
         float ratio = emissive_points * light_density / max(lobe_density, 1e-30);
         share = 1.0 / (1.0 + ratio * ratio);
       }
-#ifdef MEDIA
       weight *= media_transmittance(origin, direction, t, salt.y);
-#endif
       out_glossy.rgb += weight * emission * share;
     }
   }

@@ -56,8 +56,9 @@ void media_at(uint inside, vec3 position, inout uint seed, out vec3 scattering, 
 #ifdef MEDIA_GRIDS
     if (m.grid > 0.5) {
       ivec2 cell = medium_cell(medium, position, seed);
-      scattering += media_scattering_fetch(cell).rgb;
-      emission += media_emission_fetch(cell).rgb;
+      ivec2 first = medium_first_row(medium);
+      scattering += media_scattering_fetch(cell - first).rgb;
+      emission += media_emission_fetch(cell - first).rgb;
       continue;
     }
 #endif
@@ -79,8 +80,9 @@ vec3 media_scattered(uint inside, vec3 position, vec3 in_direction, vec3 out_dir
     if (m.grid > 0.5) {
       uint seed = cell_seed + uint(medium);
       ivec2 cell = medium_cell(medium, position, seed);
-      m.scattering = media_scattering_fetch(cell).rgb;
-      m.anisotropy = media_extinction_fetch(cell).w;
+      ivec2 first = medium_first_row(medium);
+      m.scattering = media_scattering_fetch(cell - first).rgb;
+      m.anisotropy = media_table_fetch(cell).w;
     }
 #endif
     sum += m.scattering * phase_value(m.phase, m.anisotropy, m.phase_values, mu);
@@ -126,8 +128,9 @@ float media_lobe(uint inside, vec3 position, uint cell_seed)
     if (m.grid > 0.5) {
       uint seed = cell_seed + uint(medium);
       ivec2 cell = medium_cell(medium, position, seed);
-      m.scattering = media_scattering_fetch(cell).rgb;
-      m.anisotropy = media_extinction_fetch(cell).w;
+      ivec2 first = medium_first_row(medium);
+      m.scattering = media_scattering_fetch(cell - first).rgb;
+      m.anisotropy = media_table_fetch(cell).w;
     }
 #endif
     float weight = dot(m.scattering, vec3(1.0));

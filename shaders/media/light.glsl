@@ -1,5 +1,5 @@
 // What media let pass between a place and a light.
-#include "media/media.glsl"
+#include "ask/media.glsl"
 #include "light/sources.glsl"
 
 vec3 light_through_media(Light light, ivec2 pixel, vec3 position, vec3 direction)

@@ -1,7 +1,7 @@
 // Media of the scene: what each does with light at a point, and what a ray loses on its way through them.
 //
-// `media_table` (addon/scene/media.py) holds MEDIUM_TEXELS per medium; what varies stands on grids of cells, three images
-// of one layout: extinction with anisotropy, scattering, emission. A grid is read at one cell, drawn around the point with
+// `media_table` (addon/scene/media.py) holds MEDIUM_TEXELS per medium; what varies stands on grids of cells, of one layout in
+// three images: extinction with anisotropy (above the table, in its image), scattering, emission. A grid is read at one cell, drawn around the point with
 // the weights of trilinear interpolation: a mean over samples is the interpolated value for an eighth of the fetches.
 // MEDIA_WORLD, MEDIA_BOUNDED, MEDIA_GRIDS say which kinds of media there are; others are not compiled.
 #include "lib/math.glsl"
@@ -69,6 +69,12 @@ float medium_cell_size(int medium)
 {
   return medium_texel(medium, 8).x;
 }
+
+// Of medium_cell in the images of scattering and emission.
+ivec2 medium_first_row(int medium)
+{
+  return ivec2(0, int(medium_texel(medium, 8).y));
+}
 #endif
 
 vec3 medium_extinction(int medium, vec3 position, inout uint seed)
@@ -76,7 +82,7 @@ vec3 medium_extinction(int medium, vec3 position, inout uint seed)
   vec4 a = medium_texel(medium, 0);
 #ifdef MEDIA_GRIDS
   if (a.w > 0.5) {
-    return media_extinction_fetch(medium_cell(medium, position, seed)).rgb;
+    return media_table_fetch(medium_cell(medium, position, seed)).rgb;
   }
 #endif
   return a.rgb;
@@ -97,7 +103,7 @@ vec3 media_depth(uint inside, vec3 origin, vec3 direction, float from, float to,
       vec3 sum = vec3(0.0);
       for (int i = 0; i < int(steps); i++) {
         float t = from + (float(i) + media_random(seed)) * step_length;
-        sum += media_extinction_fetch(medium_cell(medium, origin + t * direction, seed)).rgb;
+        sum += media_table_fetch(medium_cell(medium, origin + t * direction, seed)).rgb;
       }
       depth += sum * step_length;
       continue;

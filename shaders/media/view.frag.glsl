@@ -2,11 +2,7 @@
 // lamp is seen, which outshines what is behind it, from there. `around_eye`: what a solid absorbs that the eye is in.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
-#ifdef MEDIA
-#include "media/media.glsl"
-#else
-#define FARTHEST_MEDIUM 1e29
-#endif
+#include "ask/media.glsl"
 #include "media/view_ray.glsl"
 #include "light/sources.glsl"
 
@@ -22,8 +18,6 @@ void main()
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 41).x;
   vec3 through = exp(-min(around_eye.rgb * ray.limit, vec3(1e30)));
-#ifdef MEDIA
   through *= media_transmittance(ray.origin, ray.direction, ray.limit, salt);
-#endif
   out_through = vec4(through, ray.hit ? 1.0 : 0.0);
 }

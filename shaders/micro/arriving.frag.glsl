@@ -1,6 +1,6 @@
 // Irradiance at the points that gather for their groups, from their micro-buffers.
 #include "lib/math.glsl"
-#ifdef MEDIA
+#ifdef PLACES
 #include "micro/gathering.glsl"
 #endif
 #define NOTHING 0xffffffffu
@@ -17,7 +17,7 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec3 place = vec3(0.0);
-#ifdef MEDIA
+#ifdef PLACES
   vec3 axis;
   place = leaf_middle(gathering_leaf((pixel.y * NODE_ROW + pixel.x) >> 1), axis);
 #endif

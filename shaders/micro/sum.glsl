@@ -1,7 +1,8 @@
 // Irradiance from a micro-buffer: all pixels have the same share. Alpha: the share of the hemisphere that is filled.
 // A program that includes this defines MICRO_WORD(texel), what a pixel of micro-buffers holds, and `radiance_texel`.
-#ifdef MEDIA
-#include "media/media.glsl"
+#ifdef PLACES  // of nodes are bound
+#include "lib/random.glsl"
+#include "ask/media.glsl"
 
 // What media let pass between a place and the middle of the node that a pixel shows.
 vec3 micro_passing(vec3 place, uint word, int pixel)

@@ -14,19 +14,13 @@
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "lib/random.glsl"
-#ifdef MEDIA
-#include "media/media.glsl"
-#endif
+#include "ask/media.glsl"
 
 // What media let pass between a surface and what it sees along a direction at a distance.
 vec3 passing_to(vec3 position, vec3 direction, float range)
 {
-#ifdef MEDIA
   uvec3 salt = hash3(uvec3(floatBitsToUint(direction.x), floatBitsToUint(direction.y), uint(film_view.sample_index)));
   return media_transmittance(position, direction, min(range, FARTHEST_MEDIUM), salt.x);
-#else
-  return vec3(1.0);
-#endif
 }
 
 // Whether a pixel shows a surface with a diffuse closure, which is then read.

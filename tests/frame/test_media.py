@@ -36,14 +36,14 @@ def looked_at_from(snapshot, place):
 
 def update(media, snapshot):
     """Bring the media to a snapshot; whether that changed them."""
-    before = media.textures.get("media_extinction")
+    before = media.textures.get("media_table")
     compiled = [compile_material(one.name, one.graph) for one in snapshot.materials]
     media.update(snapshot, compiled, np.zeros(3), 8)
-    return media.textures["media_extinction"] is not before
+    return media.textures["media_table"] is not before
 
 
 def extinction(media):
-    return images.read(media.textures["media_extinction"])[0, : media.cells, 0]
+    return images.read(media.textures["media_table"])[media.first_row, : media.cells, 0]
 
 
 def test_voxels_follow_the_density_of_their_object(gpu_context):

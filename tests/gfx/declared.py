@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 import addon
+from addon.gfx.interface import answered
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
-from addon.lighting.grass import grown
+from addon.lighting.grass import GRASS
 from addon.lighting.loop import lighting
 from addon.lighting.visibility import HARD
 from addon.materials import nodes
@@ -76,7 +77,7 @@ def programs() -> list[Program]:
     made += [materials._scatter_program(plain), materials._glow_program(plain), materials._emission_map_program(plain)]
     made += [materials._lobe_program(plain), hit_program(plain), media.bake_program(fog(), ("density",))]
     made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
-    made += [grass_program(materials._surface_program(plain)), grown(lighting(HARD, False))]
+    made += [grass_program(materials._surface_program(plain)), answered(lighting(HARD, False), (GRASS,))]
     made += relief_programs()
     layouts = ((("UV", "VECTOR"),), (("", "COLOR"), ("", "VALUE")))
     made += [lamp_program(plain), *(materials._aov_program(plain, (held,)) for held in layouts)]

@@ -1,0 +1,48 @@
+"""What shaders ask of a scene that not every scene has: the same functions without it, and the budget of textures."""
+
+import re
+from collections import Counter
+from itertools import chain, combinations
+
+import pytest
+
+from addon.gfx.interface import Interface, answered, asked_by
+from addon.gfx.library import MOST_TEXTURES, SHADER_ROOT, resolve
+from addon.lighting.grass import GRASS
+from addon.lighting.linked import LINKS
+from addon.lighting.loop import RAYS_WHERE_NEAR, lighting
+from addon.lighting.media import MEDIA
+from addon.lighting.visibility import Lookup
+from tests.gfx.declared import _found, programs
+
+INTERFACES = (GRASS, MEDIA, LINKS)
+FUNCTION = re.compile(r"^(?:void|bool|int|float|vec[234]|Grass\w+) (\w+)\(", re.MULTILINE)
+
+
+def lit_programs():
+    """The pass of direct light with every lookup that is declared anywhere."""
+    lookups = {one.name: one for one in (*_found(Lookup), RAYS_WHERE_NEAR)}
+    return [lighting(lookups[name], soft) for name in sorted(lookups) for soft in (False, True)]
+
+
+def subsets(program):
+    there = [one for one in INTERFACES if one.asked in asked_by(program)]
+    return chain.from_iterable(combinations(there, count) for count in range(len(there) + 1))
+
+
+@pytest.mark.parametrize("interface", INTERFACES, ids=lambda one: one.name)
+def test_a_scene_without_it_has_the_same_functions(interface: Interface):
+    neutral = FUNCTION.findall((SHADER_ROOT / interface.asked).read_text(encoding="utf-8"))
+    own = FUNCTION.findall(resolve(interface.glsl, {})[0])
+    assert neutral
+    assert set(neutral) <= set(own)
+
+
+def test_every_answer_of_every_program_keeps_to_the_textures_that_metal_allows():
+    """`answered` refuses more; the counts are printed by -s."""
+    made = [answered(one, some) for one in (*programs(), *lit_programs()) for some in subsets(one)]
+    counts = Counter(len(one.textures) for one in made)
+    most = max(counts)
+    names = sorted({one.name for one in made if len(one.textures) == most})
+    print(f"\n{len(made)} programs; at most {most} textures, in {len(names)}: {'; '.join(names)}")
+    assert most <= MOST_TEXTURES
