@@ -104,8 +104,9 @@ vec3 media_scattered_by_unit(uint inside, vec3 position, vec3 in_direction, vec3
     if (m.grid > 0.5) {
       uint seed = cell_seed + uint(medium);
       ivec2 cell = medium_cell(medium, position, seed);
-      m.scattering = media_scattering_fetch(cell).rgb;
-      m.anisotropy = media_extinction_fetch(cell).w;
+      ivec2 first = medium_first_row(medium);
+      m.scattering = media_scattering_fetch(cell - first).rgb;
+      m.anisotropy = media_table_fetch(cell).w;
     }
 #endif
     vec3 amount = m.scattering + 1e-20;  // where nothing scatters, something beside it may
