@@ -67,7 +67,7 @@ void main()
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 43);
 #endif
   uint seed = roll.x;
-  Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
+  media_bins(ray.origin, ray.direction, ray.limit, seed);
 #ifdef AT_HITS
   show(pixel, vec3(0.0), bins.emitted);
 #else
@@ -105,20 +105,20 @@ void main()
       int k;
       if (by_angle) {
         t = around_draw(around, v);
-        k = bins_find(bins, t);
+        k = bins_find(t);
         if (k < 0) {
           continue;
         }
       }
       else {
-        t = bins_draw(bins, v, k);
+        t = bins_draw(v, k);
       }
-      float density = bins_density(bins, k, t);
+      float density = bins_density(k, t);
       if (around.exists) {
         density = 0.5 * (density + around_density(around, t));
       }
       vec3 position = ray.origin + t * ray.direction;
-      vec3 weight = bin_passing(bins, k, t) / max(density, 1e-30);
+      vec3 weight = bin_passing(k, t) / max(density, 1e-30);
       uint own_salt = seed + uint(i * 64 + n);
       uvec3 turn = hash3(salt + uint(n) * 3u);
       vec2 u = vec2(scrambled(film_view.bits_x, turn.x), scrambled(film_view.bits_y, turn.y));

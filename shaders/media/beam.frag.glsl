@@ -39,8 +39,8 @@ void main()
   }
   uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 47).x + floatBitsToUint(along_beam);
   // Back along the view: what is around the place, and what is left of its light at the eye.
-  Crossings c = media_crossings(position, -ray.direction);
-  uint inside = media_at_start(c);
+  media_crossings(position, -ray.direction);
+  uint inside = media_at_start();
   vec3 scattered = media_scattered(inside, position, direction, -ray.direction, seed);
   if (!(max_component(scattered) > 0.0)) {
     discard;

@@ -19,6 +19,9 @@ struct Bins {
   vec3 emitted;           // radiance that media before the end send to the start
 };
 
+// The ray that was asked for last. Not a parameter: compilers copy arrays for each call, and take long over it.
+Bins bins;
+
 #ifdef MEDIA_GRIDS
 bool any_grid(uint inside)
 {
@@ -141,7 +144,7 @@ float media_lobe(uint inside, vec3 position, uint cell_seed)
   return clamp(sum / total, -0.95, 0.95);
 }
 
-void bins_add(inout Bins bins, uint inside, vec3 origin, vec3 direction, float from, float to, inout uint seed)
+void bins_add(uint inside, vec3 origin, vec3 direction, float from, float to, inout uint seed)
 {
   if (inside == 0u || !(to > from) || bins.count >= MOST_BINS) {
     return;
@@ -178,7 +181,7 @@ void bins_add(inout Bins bins, uint inside, vec3 origin, vec3 direction, float f
 }
 
 // `left`: intervals in media from here on, each of which gets its share of the bins that there are.
-void bins_interval(inout Bins bins, uint inside, vec3 origin, vec3 direction, float from, float to, int left,
+void bins_interval(uint inside, vec3 origin, vec3 direction, float from, float to, int left,
                    inout uint seed)
 {
 #ifdef MEDIA_GRIDS
@@ -190,46 +193,44 @@ void bins_interval(inout Bins bins, uint inside, vec3 origin, vec3 direction, fl
   float part = (to - from) / parts;
   for (int i = 0; i < int(parts); i++) {
     float begin = from + float(i) * part;
-    bins_add(bins, inside, origin, direction, begin, (i + 1 < int(parts)) ? begin + part : to, seed);
+    bins_add(inside, origin, direction, begin, (i + 1 < int(parts)) ? begin + part : to, seed);
   }
 #else
-  bins_add(bins, inside, origin, direction, from, to, seed);
+  bins_add(inside, origin, direction, from, to, seed);
 #endif
 }
 
-Bins media_bins(vec3 origin, vec3 direction, float limit, inout uint seed)
+void media_bins(vec3 origin, vec3 direction, float limit, inout uint seed)
 {
-  Bins bins;
   bins.count = 0;
   bins.total = 0.0;
   bins.end = vec3(1.0);
   bins.emitted = vec3(0.0);
-  Crossings c = media_crossings(origin, direction);
-  uint start = media_at_start(c);
+  media_crossings(origin, direction);
+  uint start = media_at_start();
   int left = 0;
 #ifdef MEDIA_GRIDS
   uint around = start;
   float before = 0.0;
-  for (int i = 0; i < media_intervals(c) && before < limit; i++) {
-    float to = media_until(c, i, limit);
+  for (int i = 0; i < media_intervals() && before < limit; i++) {
+    float to = media_until(i, limit);
     left += (around != 0u && to > before) ? 1 : 0;
-    around = media_behind(c, i, around);
+    around = media_behind(i, around);
     before = to;
   }
 #endif
   uint inside = start;
   float from = 0.0;
-  for (int i = 0; i < media_intervals(c) && from < limit; i++) {
-    float to = media_until(c, i, limit);
-    bins_interval(bins, inside, origin, direction, from, to, left, seed);
+  for (int i = 0; i < media_intervals() && from < limit; i++) {
+    float to = media_until(i, limit);
+    bins_interval(inside, origin, direction, from, to, left, seed);
     left -= (inside != 0u && to > from) ? 1 : 0;
-    inside = media_behind(c, i, inside);
+    inside = media_behind(i, inside);
     from = to;
   }
-  return bins;
 }
 
-int bins_find(Bins bins, float t)
+int bins_find(float t)
 {
   for (int i = 0; i < bins.count; i++) {
     if (t >= bins.from[i] && t <= bins.to[i]) {
@@ -239,21 +240,21 @@ int bins_find(Bins bins, float t)
   return -1;
 }
 
-vec3 bin_passing(Bins bins, int k, float t)
+vec3 bin_passing(int k, float t)
 {
   return bins.left[k] * exp(-min(bins.extinction[k] * (t - bins.from[k]), vec3(1e30)));
 }
 
-float bin_mean_extinction(Bins bins, int k)
+float bin_mean_extinction(int k)
 {
   return dot(bins.extinction[k], vec3(1.0 / 3.0));
 }
 
 // Distance at which this optical depth is reached, or the end of the bins.
-float bins_deep(Bins bins, float depth)
+float bins_deep(float depth)
 {
   for (int i = 0; i < bins.count; i++) {
-    float extinction = bin_mean_extinction(bins, i);
+    float extinction = bin_mean_extinction(i);
     if (depth < extinction * (bins.to[i] - bins.from[i])) {
       return bins.from[i] + depth / extinction;
     }
@@ -263,12 +264,12 @@ float bins_deep(Bins bins, float depth)
 }
 
 // Density per metre with which bins_draw finds a place in bin k.
-float bins_density(Bins bins, int k, float t)
+float bins_density(int k, float t)
 {
   float before = (k > 0) ? bins.weight[k - 1] : 0.0;
   float share = (bins.weight[k] - before) / max(bins.total, 1e-37);
   float length_ = bins.to[k] - bins.from[k];
-  float extinction = bin_mean_extinction(bins, k);
+  float extinction = bin_mean_extinction(k);
   float depth = extinction * length_;
   if (depth < 1e-4) {
     return share / length_;
@@ -277,7 +278,7 @@ float bins_density(Bins bins, int k, float t)
 }
 
 // A place in proportion to the weights of the bins; `k`: its bin.
-float bins_draw(Bins bins, float u, out int k)
+float bins_draw(float u, out int k)
 {
   float aim = u * bins.total;
   k = 0;
@@ -287,7 +288,7 @@ float bins_draw(Bins bins, float u, out int k)
   float before = (k > 0) ? bins.weight[k - 1] : 0.0;
   float rest = clamp((aim - before) / max(bins.weight[k] - before, 1e-37), 0.0, 0.999999);
   float length_ = bins.to[k] - bins.from[k];
-  float extinction = bin_mean_extinction(bins, k);
+  float extinction = bin_mean_extinction(k);
   float depth = extinction * length_;
   float along = (depth < 1e-4) ? rest * length_
                                : -log(max(1.0 - rest * (1.0 - exp(-min(depth, 80.0))), 1e-37)) / extinction;

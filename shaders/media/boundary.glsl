@@ -19,6 +19,9 @@ struct Crossings {
   float last_dropped_at;
 };
 
+// Of the ray that was asked for last. Not a parameter: compilers copy arrays for each call, and take long over it.
+Crossings crossings;
+
 // Two crossings that are one: into or out of the same medium at the same place.
 #define SAME_PLACE 1e-5
 
@@ -61,42 +64,42 @@ uint media_boxes_met(int base, vec3 origin, vec3 inverse)
   return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
 }
 
-void crossings_insert(inout Crossings c, float t, int medium)
+void crossings_insert(float t, int medium)
 {
-  int place = min(c.count, MOST_CROSSINGS - 1);
-  for (int i = 0; i < c.count; i++) {
-    if (c.medium[i] == medium && abs(c.t[i] - t) <= SAME_PLACE * t) {
+  int place = min(crossings.count, MOST_CROSSINGS - 1);
+  for (int i = 0; i < crossings.count; i++) {
+    if (crossings.medium[i] == medium && abs(crossings.t[i] - t) <= SAME_PLACE * t) {
       return;
     }
   }
-  if (c.count == MOST_CROSSINGS) {
-    float last = c.t[MOST_CROSSINGS - 1];
-    int gone = (t >= last) ? medium : c.medium[MOST_CROSSINGS - 1];
+  if (crossings.count == MOST_CROSSINGS) {
+    float last = crossings.t[MOST_CROSSINGS - 1];
+    int gone = (t >= last) ? medium : crossings.medium[MOST_CROSSINGS - 1];
     float place_of_it = max(t, last);
-    bool known = gone == c.last_dropped && abs(c.last_dropped_at - place_of_it) <= SAME_PLACE * place_of_it;
-    c.dropped ^= known ? 0u : 1u << uint(abs(gone) - 1);
-    c.last_dropped = gone;
-    c.last_dropped_at = place_of_it;
-    c.beyond = max(c.beyond, place_of_it);
+    bool known = gone == crossings.last_dropped && abs(crossings.last_dropped_at - place_of_it) <= SAME_PLACE * place_of_it;
+    crossings.dropped ^= known ? 0u : 1u << uint(abs(gone) - 1);
+    crossings.last_dropped = gone;
+    crossings.last_dropped_at = place_of_it;
+    crossings.beyond = max(crossings.beyond, place_of_it);
     if (t >= last) {
       return;
     }
   }
-  c.count = min(c.count + 1, MOST_CROSSINGS);
+  crossings.count = min(crossings.count + 1, MOST_CROSSINGS);
   for (int i = place; i > 0; i--) {
-    if (c.t[i - 1] <= t) {
+    if (crossings.t[i - 1] <= t) {
       break;
     }
-    c.t[i] = c.t[i - 1];
-    c.medium[i] = c.medium[i - 1];
+    crossings.t[i] = crossings.t[i - 1];
+    crossings.medium[i] = crossings.medium[i - 1];
     place = i - 1;
   }
-  c.t[place] = t;
-  c.medium[place] = medium;
+  crossings.t[place] = t;
+  crossings.medium[place] = medium;
 }
 
 // Four triangles at once, then those that are met one after the other: compilers make four copies of a loop over four.
-void media_leaf(int leaf, vec3 origin, vec3 direction, inout Crossings c)
+void media_leaf(int leaf, vec3 origin, vec3 direction)
 {
   int base = int(media_table_fetch(ivec2(2047, 0)).x) + leaf * MEDIA_LEAF;
   vec4 e1x = media_leaf_texel(base + 3);
@@ -130,22 +133,21 @@ void media_leaf(int leaf, vec3 origin, vec3 direction, inout Crossings c)
     int k = findLSB(met);
     met &= met - 1u;
     int number = int(medium[k] + 0.5) + 1;
-    crossings_insert(c, t[k], (determinant[k] > 0.0) ? number : -number);  // seen from outside corners run anticlockwise
+    crossings_insert(t[k], (determinant[k] > 0.0) ? number : -number);  // seen from outside corners run anticlockwise
   }
 }
 #endif
 
-Crossings media_crossings(vec3 origin, vec3 direction)
+void media_crossings(vec3 origin, vec3 direction)
 {
-  Crossings c;
-  c.count = 0;
-  c.dropped = 0u;
-  c.beyond = 0.0;
-  c.last_dropped = 0;
-  c.last_dropped_at = 0.0;
+  crossings.count = 0;
+  crossings.dropped = 0u;
+  crossings.beyond = 0.0;
+  crossings.last_dropped = 0;
+  crossings.last_dropped_at = 0.0;
   for (int i = 0; i < MOST_CROSSINGS; i++) {
-    c.t[i] = 1e30;
-    c.medium[i] = 0;
+    crossings.t[i] = 1e30;
+    crossings.medium[i] = 0;
   }
 #ifdef MEDIA_BOUNDED
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
@@ -165,7 +167,7 @@ Crossings media_crossings(vec3 origin, vec3 direction)
     vec4 links = media_node_texel(pending[height] * MEDIA_NODE + 3);
     int nodes = int(links.z);
     if (child >= nodes) {
-      media_leaf(int(links.y) + child - nodes, origin, direction, c);
+      media_leaf(int(links.y) + child - nodes, origin, direction);
     }
     else {
       int node = int(links.x) + child;
@@ -178,12 +180,11 @@ Crossings media_crossings(vec3 origin, vec3 direction)
     }
   }
 #endif
-  return c;
 }
 
 // Media around the ray's start, as bits; the world's medium is bit 0. The first crossing of a boundary decides; where it was
 // dropped, that of a closed one by their number.
-uint media_at_start(Crossings c)
+uint media_at_start()
 {
 #ifdef MEDIA_WORLD
   uint inside = 1u;
@@ -191,36 +192,36 @@ uint media_at_start(Crossings c)
   uint inside = 0u;
 #endif
   uint seen = 1u;
-  for (int i = 0; i < c.count; i++) {
-    uint bit = 1u << uint(abs(c.medium[i]) - 1);
-    if ((seen & bit) == 0u && c.medium[i] < 0) {
+  for (int i = 0; i < crossings.count; i++) {
+    uint bit = 1u << uint(abs(crossings.medium[i]) - 1);
+    if ((seen & bit) == 0u && crossings.medium[i] < 0) {
       inside |= bit;
     }
     seen |= bit;
   }
-  return inside | (c.dropped & ~seen);
+  return inside | (crossings.dropped & ~seen);
 }
 
 // A ray is a row of intervals between crossings.
-int media_intervals(Crossings c)
+int media_intervals()
 {
-  return c.count + 1 + ((c.beyond > 0.0) ? 1 : 0);
+  return crossings.count + 1 + ((crossings.beyond > 0.0) ? 1 : 0);
 }
 
 // Where interval i ends, at most at `limit`.
-float media_until(Crossings c, int i, float limit)
+float media_until(int i, float limit)
 {
-  float end = (i < c.count) ? c.t[min(i, MOST_CROSSINGS - 1)] : (i == c.count && c.beyond > 0.0) ? c.beyond : limit;
+  float end = (i < crossings.count) ? crossings.t[min(i, MOST_CROSSINGS - 1)] : (i == crossings.count && crossings.beyond > 0.0) ? crossings.beyond : limit;
   return min(end, limit);
 }
 
 // Media behind interval i, which lies in `inside`.
-uint media_behind(Crossings c, int i, uint inside)
+uint media_behind(int i, uint inside)
 {
-  if (i >= c.count) {
-    return inside ^ c.dropped;
+  if (i >= crossings.count) {
+    return inside ^ crossings.dropped;
   }
-  int crossing = c.medium[min(i, MOST_CROSSINGS - 1)];
+  int crossing = crossings.medium[min(i, MOST_CROSSINGS - 1)];
   uint bit = 1u << uint(abs(crossing) - 1);
   return (crossing > 0) ? (inside | bit) : (inside & ~bit);
 }

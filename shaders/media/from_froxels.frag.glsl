@@ -63,7 +63,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
   uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 49).x;
-  Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
+  media_bins(ray.origin, ray.direction, ray.limit, seed);
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;
   }
@@ -72,11 +72,11 @@ void main()
   vec3 straight = vec3(0.0);
   for (int n = 0; n < PLACES; n++) {
     int k;
-    float t = bins_draw(bins, (float(n) + own) / float(PLACES), k);
+    float t = bins_draw((float(n) + own) / float(PLACES), k);
     vec3 scattering;
     vec3 emission;
     media_at(bins.media[k], ray.origin + t * ray.direction, seed, scattering, emission);
-    vec3 weight = bin_passing(bins, k, t) * scattering / max(bins_density(bins, k, t), 1e-30);
+    vec3 weight = bin_passing(k, t) * scattering / max(bins_density(k, t), 1e-30);
     if (max_component(weight) > 0.0) {
       Lit lit = lit_at(froxel_place(gl_FragCoord.xy, t));
       float share = 1.0 / max(lit.known, 1e-30);

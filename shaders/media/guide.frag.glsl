@@ -14,7 +14,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
   uint seed = roll_of(ivec2(0), film_view.sample_index, film_view.seed, 46).x;
-  Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
+  media_bins(ray.origin, ray.direction, ray.limit, seed);
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;
   }
@@ -42,22 +42,22 @@ void main()
       float half_way = (float(n / 2) + 0.5) / (0.5 * places);
       if (beside && (n & 1) == 0) {
         t = around_draw(around, half_way);
-        k = bins_find(bins, t);
+        k = bins_find(t);
       }
       else {
-        t = bins_draw(bins, beside ? half_way : v, k);
+        t = bins_draw(beside ? half_way : v, k);
       }
       if (k < 0) {
         continue;  // between media
       }
-      density = bins_density(bins, k, t);
+      density = bins_density(k, t);
       density = (beside ? 0.5 * (density + around_density(around, t)) : density) * places;
       vec3 position = ray.origin + t * ray.direction;
       vec3 direction;
       float per_steradian;
       vec3 found = light_sample(part, position, direction, per_steradian);
       found *= media_scattered(bins.media[k], position, -direction, -ray.direction, seed);
-      sum += found * bin_passing(bins, k, t) / max(density, 1e-30);
+      sum += found * bin_passing(k, t) / max(density, 1e-30);
     }
   }
   out_guide = vec4((is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z)) ? sum : vec3(0.0), 0.0);

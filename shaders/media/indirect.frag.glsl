@@ -196,7 +196,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       continue;
     }
     vec3 passed = weight * stop_sends(stop, way, lobe, seed);
-    Bins bins = media_bins(from, way, limit, seed);
+    media_bins(from, way, limit, seed);
     bool in_media = bins.total > 0.0 && bins.count > 0;
     bool at_surface = hit.x >= 0 && first_surface;
     float chance = !in_media ? 0.0 : (at_surface ? clamp(1.0 - dot(bins.end, vec3(1.0 / 3.0)), 0.1, 0.9) : 1.0);
@@ -222,10 +222,10 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       float v = media_random(seed);
       if (wanted > 0.0 || (around.exists && v < 0.5)) {
         t = (wanted > 0.0) ? wanted : around_draw(around, 2.0 * v);
-        k = bins_find(bins, t);
+        k = bins_find(t);
       }
       else {
-        t = bins_draw(bins, around.exists ? 2.0 * v - 1.0 : v, k);
+        t = bins_draw(around.exists ? 2.0 * v - 1.0 : v, k);
       }
       if (k < 0) {  // between media, or behind a surface
         if (doing == LOOK) {
@@ -233,11 +233,11 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
         }
         break;
       }
-      float density = bins_density(bins, k, t);
+      float density = bins_density(k, t);
       density = lobe * chance * (around.exists ? 0.5 * (density + around_density(around, t)) : density);
       density = (aimed > 0.0) ? mix(density, lamp_rays_density(aiming, from, way, t), aimed) : density;
       position += t * way;
-      arrives = passed * bin_passing(bins, k, t) / max(density, 1e-30);
+      arrives = passed * bin_passing(k, t) / max(density, 1e-30);
       if (doing == LOOK && number >= 0) {
         asked = ask_scattered(number, bins.media[k], position, -way, ask_turn, seed);
       }
@@ -323,31 +323,32 @@ Start start_at(vec3 position, vec3 onwards)
 }
 
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
-Start on_ray(ViewRay ray, Bins bins, int number, vec2 ask_turn, float v, uint seed)
+Start on_ray(ViewRay ray, int number, vec2 ask_turn, float v, inout uint seed)
 {
+  media_bins(ray.origin, ray.direction, ray.limit, seed);
   Start start = start_at(ray.origin, -ray.direction);
   if (!(bins.total > 0.0) || bins.count == 0) {
     return start;
   }
   LampRays rays = lamp_rays(number, ask_turn);
-  float deep = bins_deep(bins, SEEN_DEPTH);  // in endless fog all but a few places lay beyond, where nothing is seen
+  float deep = bins_deep(SEEN_DEPTH);  // in endless fog all but a few places lay beyond, where nothing is seen
   Near near = near_lamp(rays, number, ray.origin, ray.direction, bins.from[0], deep);
   int k;
   float t;
   if (near.exist && v < 0.5) {
     t = near_draw(near, 2.0 * v);
-    k = bins_find(bins, t);
+    k = bins_find(t);
   }
   else {
-    t = bins_draw(bins, near.exist ? 2.0 * v - 1.0 : v, k);
+    t = bins_draw(near.exist ? 2.0 * v - 1.0 : v, k);
   }
   if (k >= 0) {
-    float density = bins_density(bins, k, t);
+    float density = bins_density(k, t);
     density = near.exist ? 0.5 * (density + near_density(near, t)) : density;
     start.stop.position += t * ray.direction;
     start.stop.inside = bins.media[k];
     start.stop.lobe = media_lobe(start.stop.inside, start.stop.position, seed);
-    start.weight = bin_passing(bins, k, t) / max(density, 1e-30);
+    start.weight = bin_passing(k, t) / max(density, 1e-30);
   }
   return start;
 }
@@ -371,7 +372,8 @@ void main()
     return;
   }
   Start start = start_at(ray.origin + away * ray.direction, -ray.direction);
-  start.stop.inside = media_at_start(media_crossings(start.stop.position, ray.direction));
+  media_crossings(start.stop.position, ray.direction);
+  start.stop.inside = media_at_start();
   if (start.stop.inside == 0u) {
     return;
   }
@@ -396,8 +398,6 @@ void main()
   if (!ray.hit || !(max_component(s.diffuse) > 0.0)) {
     return;
   }
-#else
-  Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
 #endif
 #endif
   uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) + 4711u));
@@ -410,7 +410,7 @@ void main()
     int number = draw_row(shuffled(turn, salt.zx));
     vec2 ask_turn = vec2(media_random(seed), media_random(seed));
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
-    Start start = on_ray(ray, bins, number, ask_turn, shuffled(turn, salt.yz), seed);
+    Start start = on_ray(ray, number, ask_turn, shuffled(turn, salt.yz), seed);
 #endif
     if (max_component(start.weight) > 0.0) {
       vec3 straight;

@@ -120,13 +120,13 @@ vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
   uint seed = salt;
   vec3 depth = vec3(0.0);
 #ifdef MEDIA_BOUNDED
-  Crossings c = media_crossings(origin, direction);
-  uint inside = media_at_start(c);
+  media_crossings(origin, direction);
+  uint inside = media_at_start();
   float from = 0.0;
-  for (int i = 0; i < media_intervals(c) && from < limit; i++) {
-    float to = media_until(c, i, limit);
+  for (int i = 0; i < media_intervals() && from < limit; i++) {
+    float to = media_until(i, limit);
     depth += media_depth(inside, origin, direction, from, to, seed);
-    inside = media_behind(c, i, inside);
+    inside = media_behind(i, inside);
     from = to;
   }
 #elif defined(MEDIA_WORLD)
