@@ -1,5 +1,7 @@
 // What does not depend on lights: emission, the visible world, colours and normals of this sample. NOT_DRAWN: outputs
 // that this picture does not hold, declared; SUM_ALL: the sum of light that is not held apart (film/together.py).
+// Leaves out media: an image of what they let pass along the view dims what is collected (media/view.frag.glsl).
+// Leaves out links: the camera sees lamps whatever they light.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #ifdef SOFT_LOBES

@@ -1,5 +1,7 @@
 // Light that rays find by themselves: emission of what they met, and, behind the first surface, lamps and the world. The
 // first surface's own lamps and world are left to light/traced.frag.glsl and light/refraction.frag.glsl.
+// Leaves out media: MediaService.fade (addon/lighting/media.py) dims what is found before and behind.
+// Leaves out links: light that comes by way of surfaces reaches every receiver.
 #include "lib/random.glsl"
 #include "lib/environment.glsl"
 #include "light/sources.glsl"

@@ -2,6 +2,7 @@
 //
 // A program that includes this binds the surface images, `film_view`, `sources`, the hierarchy and `reflectance`, and has
 // the constants `light_count` and `offset_size`.
+// Leaves out links: light that comes by way of surfaces reaches every receiver.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "light/sources.glsl"

@@ -6,6 +6,7 @@
 // and the world the first interface lets arrive is all that is left to do here.
 //
 // What the first interface lets arrive is direct; all else is indirect, as in Cycles' passes.
+// Leaves out links: in media and through glass light reaches every receiver.
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"

@@ -1,5 +1,7 @@
 // How much the points of one light (row) differ in what they bring to a probe (column), a pixel of a coarse grid:
 // mean and mean square of the irradiance by single points, visibility traced.
+// Leaves out media: it asks how much points of a light differ, not how much arrives.
+// Leaves out links: likewise.
 #include "lib/gbuffer.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"

@@ -1,4 +1,6 @@
 // Visibility of up to four lights, one in each channel, at every RATE-th pixel of the picture along both axes.
+// Leaves out media: visibility alone is found; the pass of light that reads it asks them.
+// Leaves out links: likewise.
 #include "light/visibility_at.glsl"
 
 void main()

@@ -1,5 +1,7 @@
 // Visibility of lights at the pixels that look for themselves (light/visibility_between.comp.glsl): those in a list for
 // each light, or, where shaders cannot count, all that are marked. Of the lights one above the other.
+// Leaves out media: visibility alone is found; the pass of light that reads it asks them.
+// Leaves out links: likewise.
 #include "light/visibility_at.glsl"
 #ifdef LISTED
 #include "lib/entry_list.glsl"

@@ -1,4 +1,5 @@
 // What media let pass along rays of lobes, up to what each has met or, where it is nearer, a lamp that it sees.
+// Leaves out links: it asks where lamps stand, not whom they light.
 #include "media/media.glsl"
 #include "light/sources.glsl"
 

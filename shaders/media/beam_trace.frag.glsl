@@ -3,6 +3,7 @@
 // Rays of a lamp fill the cone around its casters evenly (a sun's, a disc across its direction). At smooth interfaces a ray
 // is mirrored or bent at random, by Fresnel's reflectance; what is diffuse ends it. Two stretches are kept, each as its ends,
 // its flux in watts, and half the distance to the ray of the next texel as it would be had nothing bent them.
+// Leaves out links: in media and through glass light reaches every receiver.
 #include "media/media.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"

@@ -1,5 +1,6 @@
 // A ray through media as a row of bins, in each of which extinction is taken as even: what is left of light where a bin
 // begins, and a density of places to scatter at, in proportion to what a place would send back if it were lit evenly.
+// Leaves out links: in media and through glass light reaches every receiver.
 #include "media/media.glsl"
 #include "media/phase.glsl"
 

@@ -1,5 +1,6 @@
 // What the media let pass of the light that comes along each pixel's view ray from the surface, or from infinity; where a
 // lamp is seen, which outshines what is behind it, from there. `around_eye`: what a solid absorbs that the eye is in.
+// Leaves out links: it asks where lamps stand, not whom they light.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "ask/media.glsl"

@@ -13,9 +13,11 @@ from addon.lighting.linked import LINKS
 from addon.lighting.loop import RAYS_WHERE_NEAR, lighting
 from addon.lighting.media import MEDIA
 from addon.lighting.visibility import Lookup
+from addon.sources.lights import SOURCES
 from tests.gfx.declared import _found, programs
 
 INTERFACES = (GRASS, MEDIA, LINKS)
+LEAVES_OUT = re.compile(r"^// Leaves out (\w+): \w.+\.$", re.MULTILINE)
 FUNCTION = re.compile(r"^(?:void|bool|int|float|vec[234]|Grass\w+) (\w+)\(", re.MULTILINE)
 
 
@@ -46,3 +48,18 @@ def test_every_answer_of_every_program_keeps_to_the_textures_that_metal_allows()
     names = sorted({one.name for one in made if len(one.textures) == most})
     print(f"\n{len(made)} programs; at most {most} textures, in {len(names)}: {'; '.join(names)}")
     assert most <= MOST_TEXTURES
+
+
+def test_a_program_that_reads_lights_asks_what_dims_them_or_says_why_not():
+    """In a line of the shader, `// Leaves out media: …`, or in Program.leaves_out."""
+    silent = []
+    for one in (*programs(), *lit_programs()):
+        if any(struct is SOURCES for struct, _ in one.blocks):
+            found = [resolve(file, dict(one.snippets)) for file in (one.vertex, one.fragment, one.compute) if file]
+            files = {file for _, origin in found for file, _ in origin}
+            said = {name for name, _ in one.leaves_out}.union(*(LEAVES_OUT.findall(text) for text, _ in found))
+            silent += [
+                f"{one.name}: {kind.name}" for kind in (MEDIA, LINKS)
+                if kind.name not in said and not files & {kind.asked, kind.glsl}
+            ]  # fmt: skip
+    assert not silent
