@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..gfx import context, images, passes
+from ..gfx.library import MOST_TEXTURES
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler, Stopwatch
 from ..materials.compiler import may_reflect
@@ -23,7 +24,7 @@ from ..scene.opacity_maps import OpacityMaps
 from ..scene.surface_means import SurfaceMeans
 from ..scene.view import VIEW, View
 from ..scene.world_tree import WorldTree
-from ..snapshot.scene import NO_LINKS, RANKED, Snapshot
+from ..snapshot.scene import NO_LINKS, RANKED, Note, Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
 from . import device_probe
@@ -91,6 +92,7 @@ class Renderer:
         context.ensure()
         context.begin_picture()
         device_probe.ensure()
+        passes.left_out.clear()
         ledger = Ledger(samples=0)
         self.materials.update(snapshot)
         snapshot = self.displacement.apply(snapshot, self.materials)
@@ -299,6 +301,7 @@ class Renderer:
             ledger.times["passes"] = took
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
+        ledger.notes = tuple(dict.fromkeys((*ledger.notes, *_without_room())))
         ledger.bad_pixels = bad
         if self.publishes:
             ledger_module.publish(ledger)
@@ -444,3 +447,17 @@ def lights_key(snapshot: Snapshot) -> tuple:
          *(() if light.graph is None else (light.graph, light.random, light.pass_index, light.color)), light.links)
         for light in snapshot.lights
     )  # fmt: skip
+
+
+# What artists call images that programs read beside others (gfx/images.py, gfx/struct.py).
+BESIDE = {"lamp_maps": "what node trees of lamps do to their light", "surface_edit": "edits of reflections"}
+
+
+def _without_room() -> Iterator[Note]:
+    """What passes of this picture have left out, since graphics cards allow them no more textures."""
+    for program, name in sorted(passes.left_out):
+        text = (
+            f"the pass '{program}' leaves out {BESIDE.get(name, name)}: with all that this scene asks of it, it would "
+            f"read more than {MOST_TEXTURES} textures. Another technique in its slot may have room for them."
+        )
+        yield Note("Scene", text)

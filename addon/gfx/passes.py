@@ -19,6 +19,9 @@ FULLSCREEN_VARYINGS = (("smooth", "VEC2", "screen"),)
 
 QUAD_INPUTS = FULLSCREEN_INPUTS
 
+# Programs and the names of images beside those that they read, for which they have no room: since it was emptied last.
+left_out: set[tuple[str, str]] = set()
+
 _triangle: list[gpu.types.GPUBatch] = []
 _quad: list[gpu.types.GPUBatch] = []
 
@@ -140,7 +143,9 @@ def _for_images(program: Program, bindings: dict) -> Shader:
     beside = {name: image for one in bound for name, image in one.beside.items() if name not in read}
     room = MOST_TEXTURES - len(program.textures)
     if len(beside) > room:  # the first ones are those that can be spared least
-        beside = dict(list(beside.items())[: max(room, 0)])
+        kept = dict(list(beside.items())[: max(room, 0)])
+        left_out.update((program.name, name) for name in beside if name not in kept)
+        beside = kept
     if beside:
         bindings["textures"] = {**read, **beside}
     defines = tuple(one for image in read.values() for one in image.defines)

@@ -219,3 +219,24 @@ def test_dispatch_finds_what_was_drawn_before_it(gpu_context):
         passes.fullscreen(CONSTANT, drawn, constants={"value": (k, k, k, k)})
         passes.compute(TAKEN, size, textures={"drawn": drawn.colors[0]}, images={"copied": copied})
         assert (images.read(copied) == k).all()
+
+
+def test_an_image_beside_others_is_said_to_be_left_out_where_a_program_has_no_room(gpu_context):
+    names = tuple(f"picture{k}" for k in range(library.MOST_TEXTURES))
+    total = " + ".join(f"{name}_fetch(ivec2(0))" for name in names)
+    crowded = passes.fullscreen_program(
+        "crowded",
+        "generated/main",
+        textures=tuple(("RGBA32F", name) for name in names),
+        outputs=(("VEC4", "out_sum"),),
+        snippets=(("generated/main", f"void main() {{ out_sum = {total}; }}"),),
+    )
+    one = images.upload(np.ones((1, 1, 4), np.float32))
+    beside = images.upload(np.ones((1, 1, 4), np.float32))
+    beside.beside = {"lamp_maps": one}
+    passes.left_out.clear()
+    target = images.Target((images.create(1, 1, "RGBA32F"),))
+    passes.fullscreen(crowded, target, textures=dict.fromkeys(names, beside))
+    assert passes.left_out == {("crowded", "lamp_maps")}
+    assert images.read(target.colors[0])[0, 0, 0] == len(names)
+    passes.left_out.clear()
