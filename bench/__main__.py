@@ -17,6 +17,7 @@ from bench import (
     direct,
     edges,
     everything,
+    flicker,
     glare,
     gpu,
     grass,
@@ -83,6 +84,7 @@ VERBS = {
     "hashes": hashes,
     "mutations": mutations,
     "pairs": pairs,
+    "flicker": flicker,
     "all": everything,
 }
 

@@ -1,0 +1,116 @@
+"""What moves in a picture that should hold still: `python -m bench flicker`.
+
+The camera moves slowly, about 1.3 pixels a frame, over ten frames with one seed. Each frame is compared with Cycles' of
+many samples, in levels of eight bits (sRGB, one exposure for all frames of a scene):
+
+    grain     standard deviation over the frames of a pixel's error
+    boiling   the same after a blur of 5x5 pixels: what is seen as a picture that breathes
+    jitter    peak to peak of the mean error of whole frames
+
+Errors that stand still count for nothing here: they are what other benchmarks measure. Denoised Cycles and EEVEE stand
+beside. References are kept by content.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from bench.cells import ROOT
+from bench.markdown import put_between, table
+
+COMMAND = "python -m bench flicker"
+PAGE = ROOT / "docs" / "flicker.md"
+SIZE, FRAMES, STEP_PIXELS, BLUR = (160, 120), 10, 1.3, 5
+REFERENCE_SAMPLES = 256  # of each of the two renders
+SCENES = ("window_interior", "cornell_box", "sky_courtyard")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenes", nargs="+", default=list(SCENES), help="sample files, or paths of .blend files")
+    parser.add_argument("--samples", type=int, nargs="+", default=[1, 16])
+    parser.add_argument("--frames", type=int, default=FRAMES)
+    parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")
+    parser.add_argument("--no-peers", action="store_true", help="Candela alone")
+    parser.add_argument("--page", action="store_true", help=f"write the table into docs/{PAGE.name}")
+
+
+def command(options: argparse.Namespace) -> int:
+    import addon
+
+    addon.register()
+    rows = [["scene", "engine", "samples", "grain", "boiling", "jitter"]]
+    for scene in options.scenes:
+        for row in measured(scene, options):
+            rows.append(row)
+            print("  ".join(row), flush=True)
+    print(table(rows))
+    if options.page:
+        put_between(PAGE, COMMAND, table(rows))
+    return 0
+
+
+def measured(name: str, options: argparse.Namespace):
+    """Rows of a scene: Candela by number of samples, then its peers."""
+    import bpy
+
+    from addon.compare.reference import reference, render_passes
+
+    path = Path(name) if name.endswith(".blend") else ROOT / "sample_blends" / f"{name}.blend"
+    size = tuple(int(edge) for edge in options.size.split("x"))
+    entrants = [("Candela", "CANDELA", n, ()) for n in options.samples]
+    if not options.no_peers:
+        entrants += [("Cycles, denoised", "CYCLES", 4, (("use_denoising", True),)), ("EEVEE", "BLENDER_EEVEE", 16, ())]
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    scene = bpy.context.scene
+    start = scene.camera.matrix_world.copy()
+    truths = [
+        reference(scene, REFERENCE_SAMPLES, size=size).images["combined"][..., :3]
+        for _ in moved(scene, start, options.frames, size)
+    ]
+    exposure = 1.0 / max(float(np.percentile(truths[0], 95)), 1e-6)
+    for label, engine, samples, extra in entrants:
+        settings = [(scene.cycles, key, value) for key, value in extra]
+        errors = []
+        for number in moved(scene, start, options.frames, size):
+            shown = render_passes(scene, engine, samples, 1, size=size, extra=settings).images["combined"][..., :3]
+            errors.append(levels(shown, exposure) - levels(truths[number], exposure))
+        grain, boiling, jitter = figures(np.array(errors))
+        yield [path.stem.replace("_", " "), label, str(samples), f"{grain:.1f}", f"{boiling:.2f}", f"{jitter:.2f}"]
+
+
+def moved(scene, start, frames: int, size: tuple[int, int]):
+    """Numbers of frames; the camera goes sideways, so that what is 5 m away moves by STEP_PIXELS a frame."""
+    import bpy
+    import mathutils
+
+    data = scene.camera.data
+    wide = data.ortho_scale if data.type == "ORTHO" else 2.0 * 5.0 * np.tan(data.angle / 2)
+    for number in range(frames):
+        way = mathutils.Matrix.Translation((number * STEP_PIXELS * wide / size[0], 0.0, 0.0))
+        scene.camera.matrix_world = start @ way
+        bpy.context.view_layer.update()
+        yield number
+
+
+def levels(linear: np.ndarray, exposure: float) -> np.ndarray:
+    """Radiance as eight-bit levels, not rounded."""
+    from addon.compare.metrics import display
+
+    return 255.0 * display(linear * exposure).astype(np.float64)
+
+
+def figures(errors: np.ndarray) -> tuple[float, float, float]:
+    """Grain, boiling and jitter of errors (frames, H, W, 3), in their units."""
+    blurred = np.stack([_blurred(error) for error in errors])
+    jitter = float(np.ptp(errors.mean(axis=(1, 2, 3))))
+    return float(errors.std(axis=0).mean()), float(blurred.std(axis=0).mean()), jitter
+
+
+def _blurred(image: np.ndarray) -> np.ndarray:
+    """Means of BLUR x BLUR pixels, without the rim."""
+    sums = np.pad(image, ((1, 0), (1, 0), (0, 0))).cumsum(axis=0).cumsum(axis=1)
+    k = BLUR
+    return (sums[k:, k:] - sums[:-k, k:] - sums[k:, :-k] + sums[:-k, :-k]) / (k * k)
