@@ -98,21 +98,16 @@ class Turns:
         self._weights: list[Mapping[int, float]] | None = None
         self._asks = False
 
-    def begin(self, frame: Frame, names: Sequence[str]) -> None:
-        """`names`: the images that the technique adds to, those of light first paths."""
+    def begin(self, frame: Frame, names: Sequence[str], may_rest: bool = True) -> None:
+        """`names`: the images that the technique adds to; unless it `may_rest`, all samples have all of it."""
         self.drop()
         self._names = tuple(names)
         self._light = tuple(name for name in names if name.startswith("radiance."))
         settings = frame.settings
         self._asks = (
-            settings.whole and not settings.may_end_early and frame.numbers is None
+            may_rest and settings.whole and not settings.may_end_early and frame.numbers is None
             and settings.samples >= FEWEST_SAMPLES and not _clamped(frame)
         )  # fmt: skip
-
-    @property
-    def rests(self) -> bool:
-        """Whether some samples of this picture go without some part."""
-        return self._weights is not None and any(len(one) < self._samples for one in self._weights)
 
     def weight(self, frame: Frame, part: int = 0) -> float:
         """Of a part in this sample; 0: it is not drawn."""
@@ -121,6 +116,28 @@ class Turns:
         if self._weights is None or frame.is_first:
             return 1.0
         return self._weights[min(part, len(self._weights) - 1)].get(frame.sample, 0.0)
+
+    @property
+    def may_rest(self) -> bool:
+        """Whether samples of this picture may go without some part."""
+        return self._asks or self._weights is not None
+
+    def turn(self, frame: Frame) -> tuple[int, int]:
+        """In how many samples the first part was drawn before this one, and how many there will be."""
+        if self._weights is None:
+            return frame.sample, frame.settings.samples
+        taken = sorted(self._weights[0])
+        return taken.index(frame.sample), len(taken)
+
+    def renews(self, frame: Frame, apart: int) -> bool:
+        """Whether what serves several samples once it is made is to be made anew in this one: in samples that have the
+        first part, at least `apart` samples apart in the mean; in all of them where it cannot rest."""
+        if self._weights is None:
+            return frame.is_first or not self.may_rest
+        return frame.sample in turns(self._samples, (*self._apart[:1], max(self._apart[0], self._most_apart(apart))))
+
+    def _most_apart(self, apart: int) -> int:
+        return min(apart, most_apart(self._samples))
 
     @contextmanager
     def drawing(self, frame: Frame) -> Iterator[Drawing]:
@@ -157,6 +174,7 @@ class Turns:
         tiles = self._reading.pixels().reshape(self._most + 1, -1, 4)
         self._reading = None
         means, apart, self._weights = tiles[-1, :, 1], [], []
+        self._apart = apart
         shares = [share_of(tiles[k, :, 0], means) for k in range(self._measured)]
         for part in range(self._measured):
             least = apart_by(max(shares[part:]), self._samples)  # what comes behind it needs it

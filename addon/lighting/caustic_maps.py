@@ -95,23 +95,33 @@ class CausticMaps:
         self._map: images.Target | None = None
         self._blocks: list[Block] = []
         self._shift = np.zeros(2)
+        self._lasting = False
 
-    def begin(self, frame: Frame, resting: set[str]) -> None:
-        """Drop the maps of the sample before. Lights that are `resting` have theirs in other samples."""
+    def begin(self, frame: Frame, resting: set[str], lasting: bool = False) -> None:
+        """Drop the maps of the sample before. Lights that are `resting` have theirs in other samples; `lasting`: what
+        this sample makes serves those behind it, too, up to the next that begins."""
         self.end()
+        self._lasting = lasting
         self.lights = set(resting)
         self._sample = weakref.ref(frame), frame.sample
         self._shift = np.array(frame.random_at(frame.sample, "caustics/map"))
 
+    def done(self) -> None:
+        """Nobody asks for the maps in this sample any more."""
+        if not self._lasting:
+            self.end()
+
     def end(self) -> None:
-        """Give the maps back: nobody asks for them in this sample any more."""
+        """Give the maps back."""
         for one in self.maps:
             images.pool.give(one.image)
         self.maps, self.lights, self._sample = [], set(), None
 
     def of(self, frame: Frame) -> list[KeptMap]:
         """The maps of the sample that `frame` is drawing."""
-        return self.maps if self._sample is not None and self._sample == (weakref.ref(frame), frame.sample) else []
+        if self._sample is None or self._sample[0]() is not frame:
+            return []
+        return self.maps if self._lasting or self._sample[1] == frame.sample else []
 
     def wants(self, frame: Frame, light: LitView) -> bool:
         """Whether rays of lobes meet surfaces that ask for a map of this view, and there is room for it; of a light

@@ -155,11 +155,14 @@ class Photons:
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
         self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
 
-    def views(self, frame: Frame, casters: caustic_casters.Casters, side: int) -> Iterator[LitView]:
-        """Views of the lights whose turn it is in this sample, `side` photons along each side."""
+    def views(
+        self, frame: Frame, casters: caustic_casters.Casters, side: int, turn: tuple[int, int] | None = None
+    ) -> Iterator[LitView]:
+        """Views of the lights whose turn it is in this sample, `side` photons along each side. `turn`: how many samples
+        had photons before, and how many have in all, where not all samples do and whoever asks weighs them."""
         reflected = (REFLECTED,) if frame.snapshot.film.caustics_reflective else ()
         alone = frame.settings.whole and frame.settings.samples == 1
-        for emitter, index, count, weight in self._turns(frame, casters):
+        for emitter, index, count, weight in self._turns(frame, casters, turn):
             bends = casters.refracting and emitter.light.key in casters.bent
             lobes = ((REFRACTED,) if bends else ()) + reflected
             boxes = list(caustic_casters.boxes_of(frame, casters))
@@ -187,14 +190,21 @@ class Photons:
             return answered, 1
         return answered, max(1, min(settings.samples, -(-len(answered) * len(casters.low) // VIEWS)))
 
-    def _turns(self, frame: Frame, casters: caustic_casters.Casters):
+    def _turns(self, frame: Frame, casters: caustic_casters.Casters, turn: tuple[int, int] | None):
         """The lights of this sample, with the last three fields of their views."""
         settings = frame.settings
         answered, rounds = self._rounds(frame, casters)
-        for turn, emitter in enumerate(answered):
-            if frame.sample % rounds == turn % rounds:
-                count = len(range(turn % rounds, settings.samples, rounds)) if settings.whole else frame.sample + 1
+        if turn is not None:
+            yield from ((emitter, *turn, 1.0) for emitter in answered)
+            return
+        for number, emitter in enumerate(answered):
+            if frame.sample % rounds == number % rounds:
+                count = len(range(number % rounds, settings.samples, rounds)) if settings.whole else frame.sample + 1
                 yield emitter, frame.sample // rounds, count, settings.samples / count if settings.whole else 1.0
+
+    def all_at_once(self, frame: Frame, casters: caustic_casters.Casters) -> bool:
+        """Whether a sample that has photons has those of all lights."""
+        return self._rounds(frame, casters)[1] == 1
 
     def resting(self, frame: Frame, casters: caustic_casters.Casters) -> set[str]:
         """Keys of the lights whose turn it is not in this sample."""

@@ -31,12 +31,14 @@ from collections.abc import Iterator
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.picture import Frame
 from ..frame.settings import Settings
+from ..frame.shares import Turns
 from ..frame.technique import Param, Technique, Write
+from ..gfx import images
 from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters
 from ..lighting.caustic_maps import SEEN, CausticMaps
-from ..lighting.photons import FOOTPRINTS, PHOTONS, Photons
+from ..lighting.photons import FOOTPRINTS, PHOTONS, LitView, Photons
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -51,6 +53,7 @@ SPLAT = splats.splat_program(
     outputs=(("VEC4", "out_light"),),
 )
 LEAST_PIXELS = 0.8
+MAPS_APART = 4  # samples for which rays ask the same map: it costs as much as the picture's photons, and shows less
 INTERFACES = Param(
     "interfaces", "Interfaces", 8,
     "Number of glass or mirror surfaces after the first that a photon may meet before a diffuse surface",
@@ -78,6 +81,7 @@ class ScreenSpacePhotons(Technique):
     def __init__(self):
         self._photons = Photons()
         self._casters: caustic_casters.Casters | None = None
+        self._turns = Turns(self)
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if settings.bounces < 1:
@@ -96,35 +100,47 @@ class ScreenSpacePhotons(Technique):
         self._casters = caustic_casters.of(frame)
         if self._casters is not None:
             self._photons.begin(frame, self._casters)
+            at_once = self._photons.all_at_once(frame, self._casters)
+            self._turns.begin(frame, ("radiance.diffuse_indirect",), at_once)
 
     def sample(self, frame: Frame) -> Iterator[None]:
-        if self._casters is None:
+        if self._casters is None or not self._turns.weight(frame):
             return
-        settings = frame.settings
-        side, interfaces = settings.get(self, "grid"), settings.get(self, "interfaces")
-        seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}
+        side = frame.settings.get(self, "grid")
         maps = frame.kept(CausticMaps)
-        maps.begin(frame, self._photons.resting(frame, self._casters))
-        for light in self._photons.views(frame, self._casters, side):
-            at_hits = maps.wants(frame, light)
+        renews = self._turns.renews(frame, MAPS_APART)
+        if renews:
+            maps.begin(frame, self._photons.resting(frame, self._casters), self._turns.may_rest)
+        turn = self._turns.turn(frame) if self._turns.may_rest else None
+        with self._turns.drawing(frame) as drawing:
+            target = images.Target((drawing.images(0)["radiance.diffuse_indirect"],))
+            for light in self._photons.views(frame, self._casters, side, turn):
+                self._add(frame, target, light, maps if renews else None)
+                yield
+            drawing.done(0)
+
+    def _add(self, frame: Frame, target: images.Target, light: LitView, maps: CausticMaps | None) -> None:
+        """Photons of a light's view, into the picture and into the map that rays ask, where there is one."""
+        seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}
+        at_hits = maps is not None and maps.wants(frame, light)
+        if at_hits:
+            into_kept = maps.add(frame, self, self._casters, light, self._photons)
+        for bundle in self._photons.traced(frame, self, self._casters, light, frame.settings.get(self, "interfaces")):
+            records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
+            splats.draw(
+                SPLAT,
+                target,
+                records,
+                textures={**seen, "energy_table": frame.materials.energy_table},
+                blocks={"film_view": frame.view_block},
+            )
+            frame.count(self, "passes")
             if at_hits:
-                into_kept = maps.add(frame, self, self._casters, light, self._photons)
-            for bundle in self._photons.traced(frame, self, self._casters, light, interfaces):
-                records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
-                splats.draw(
-                    SPLAT,
-                    frame.target("radiance.diffuse_indirect"),
-                    records,
-                    textures={**seen, "energy_table": frame.materials.energy_table},
-                    blocks={"film_view": frame.view_block},
-                )
-                frame.count(self, "passes")
-                if at_hits:
-                    into_kept(bundle)
-            if at_hits:
-                maps.keep(frame, self)
-            yield
+                into_kept(bundle)
+        if at_hits:
+            maps.keep(frame, self)
 
     def release(self) -> None:
         self._photons.release()
+        self._turns.drop()
         self._casters = None

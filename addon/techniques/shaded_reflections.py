@@ -234,7 +234,7 @@ class ShadedReflections(Technique):
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
             return
         if not self._turns.weight(frame):
-            frame.kept(CausticMaps).end()
+            frame.kept(CausticMaps).done()
             return
         hits, transmission = frame.kept(Hits), refracts(frame)
         maps = frame.kept(CausticMaps)
@@ -289,7 +289,7 @@ class ShadedReflections(Technique):
             for image in (*rays.colors, *onward.colors, *closures.colors):
                 images.pool.give(image)
             records.give()
-            maps.end()
+            maps.done()
         frame.count(self, "light samples", len(rows))
 
     @staticmethod

@@ -7,9 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.frame import shares
 from addon.frame.ledger import RAN, SKIPPED
 from addon.lighting import photons
 from addon.lighting.caustic_casters import grown
+from addon.lighting.caustic_maps import CausticMaps
 from addon.lighting.light_views import groups
 from tests.techniques.conftest import places
 from tests.techniques.foggy_stage import absorber, box, fill
@@ -700,6 +702,16 @@ def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
 
 
 @pytest.mark.slow
+def test_a_map_that_serves_several_samples_is_as_bright(stage, monkeypatch):
+    """In a mirror: rays of 16 samples ask the maps of 5."""
+    begun, begin = [], CausticMaps.begin
+    monkeypatch.setattr(CausticMaps, "begin", lambda *given: begun.append(given) or begin(*given))
+    seen, mirrored = seen_directly_and_in_a_mirror(stage, PHOTONS, 1.5, samples=16)
+    assert mirrored.sum() == pytest.approx(seen.sum(), rel=0.05)
+    assert len(begun) <= 2 * 5  # of two pictures
+
+
+@pytest.mark.slow
 def test_glass_that_bends_nothing_leaves_no_trace_in_a_mirror(stage, technique_name):
     _, mirrored = seen_directly_and_in_a_mirror(stage, technique_name, 1.0)
     x, y = places((48, 48), 1.6)
@@ -711,6 +723,7 @@ def test_glass_that_bends_nothing_leaves_no_trace_in_a_mirror(stage, technique_n
 @pytest.mark.slow
 def test_lights_that_take_turns_shine_as_much_as_if_each_sample_had_all(stage, technique, monkeypatch):
     """Three lamps over two balls are six views: 4 a sample at most, so that two rounds have all."""
+    monkeypatch.setattr(shares, "FEWEST_SAMPLES", 1000)  # else samples rest for their small share, too
     stage.floor()
     for side in (-0.8, 0.8):
         ball(stage, glass(stage), radius=0.4, place=(side, 0, 0.8), segments=32)
