@@ -37,11 +37,32 @@ def steps():
     result["engine"] = scene.render.engine
     scene.candela.samples = scene.candela.viewport_samples = SAMPLES
     bounces, scene.candela.bounces = scene.candela.bounces, 0  # indirect light takes its time without a GPU
+    yield from first_look()
     yield from final_renders(scene)
     yield from resting_camera_view()
     yield from orbit(bounces)
     yield from panels()
     yield from same_view()
+
+
+def first_look():
+    """Rendered is chosen in a process that has compiled nothing: until the first picture with light, and how long
+    Blender did not answer meanwhile."""
+    space = viewport_area().spaces.active
+    shading, space.shading.type = space.shading.type, "RENDERED"
+    started = before = time.monotonic()
+    first, longest, said = None, 0.0, set()
+    while first is None or viewports()[0].looks:
+        yield 0.0
+        now = time.monotonic()
+        longest, before = max(longest, now - before), now
+        if viewports():
+            said.add(viewports()[0].status().split(" (")[0])
+            if first is None and viewports()[0].picture is not None:
+                first = now - started
+    result["cold"] = {"first_s": first, "lit_s": now - started, "longest_s": longest, "said": sorted(said)}
+    space.shading.type = shading
+    yield 1.5
 
 
 def final_renders(scene):

@@ -123,6 +123,13 @@ def test_engine_is_there_and_nothing_failed(driven):
     assert not complaints(folder)
 
 
+def test_viewport_shows_something_at_once_and_says_that_it_compiles(driven):
+    _, result = driven
+    assert result["cold"]["first_s"] < 2.0
+    assert result["cold"]["longest_s"] < 0.8 * result["cold"]["lit_s"]  # programs come in over many redraws
+    assert any(text.startswith("Compiling shaders") for text in result["cold"]["said"])
+
+
 def test_f12_completes_with_a_picture(driven):
     folder, result = driven
     assert result["render"] == "complete"
