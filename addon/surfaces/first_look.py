@@ -55,6 +55,7 @@ FINE = passes.fullscreen_program(
     constants=(("FLOAT", "faint"),),
     outputs=(("VEC4", "out_fine"),),
 )
+SOLID = 0.9  # opacity from which on a surface hides what is behind
 FAINT = 0.02  # radiance, by the exposure, that is as good as black where colours are compared
 
 
@@ -78,9 +79,11 @@ class FirstLook:
         return self._target.colors[1] if self._target else None
 
     def draw(
-        self, snapshot: Snapshot, geometry: SceneGeometry, materials: list[CompiledMaterial], view: View
-    ) -> images.Image:
-        """The scene as `geometry` holds it, through a view of it."""
+        self, snapshot: Snapshot, geometry: SceneGeometry, materials: list[CompiledMaterial], view: View,
+        guides: bool = False,
+    ) -> images.Image:  # fmt: skip
+        """The scene as `geometry` holds it, through a view of it. What lets light pass hides every other pixel; of what
+        `guides` a draft glass is whole, and other such surfaces, whose shape stands in an image, are left out."""
         values = view.values(0, 0, (0.0, 0.0), geometry.size)
         self._view = _updated(self._view, VIEW, values)
         self._lamps = _updated(self._lamps, LAMPS, lamp_values(snapshot, geometry, values))
@@ -96,16 +99,16 @@ class FirstLook:
         with passes.drawing(self._target):
             for call in calls(geometry.draws, np.flatnonzero(geometry.boxes.seen(rows))):
                 shown = materials[call.draw.material]
-                if shown.bounds_alone:
+                if shown.bounds_alone or (guides and _lets_pass(shown) and shown.glass is None):
                     continue
                 if material is None:
                     shader.bind(
                         textures={"instances": geometry.instances},
                         blocks={"film_view": self._view, "first_lamps": self._lamps},
-                        constants={"first_instance": call.first, **_look_of(shown)},
+                        constants={"first_instance": call.first, **_look_of(shown, guides)},
                     )
                 elif call.draw.material != material:
-                    shader.change(constants=_look_of(shown))
+                    shader.change(constants=_look_of(shown, guides))
                 material = call.draw.material
                 shader.set_constant("first_instance", call.first)
                 passes.draw(shader, call.draw.batch, call.count)
@@ -144,8 +147,12 @@ def _updated(block: Block | None, struct: Struct, values: dict) -> Block:
     return block
 
 
-def _look_of(material: CompiledMaterial) -> dict[str, tuple[float, ...]]:
-    solid = 0.0 if material.opacity < 0.5 or material.glass is not None else 1.0
+def _lets_pass(material: CompiledMaterial) -> bool:
+    return material.transparent and material.opacity < SOLID
+
+
+def _look_of(material: CompiledMaterial, guides: bool) -> dict[str, tuple[float, ...]]:
+    solid = float(guides or not (_lets_pass(material) or material.glass is not None))
     glow = np.clip(np.nan_to_num(material.emission, posinf=1e4), 0.0, 1e4)
     return {"flat_color": (*np.clip(material.color, 0.0, 1.0), solid), "flat_glow": (*glow, 0.0)}
 

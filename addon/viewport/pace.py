@@ -53,7 +53,7 @@ class Pace:
         return next(quick, max(finer, default=1))
 
 
-GUIDE_SHARE = 0.35  # of a step, at most, that finding the shapes of a draft may take
+GUIDE_SHARE = 0.35  # of a step, or of the draft where that takes longer, that finding its shapes may take
 
 
 @dataclass

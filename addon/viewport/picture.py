@@ -246,10 +246,12 @@ class Viewport:
         self._shown_place = self._begun_for
 
     def _with_shapes(self, frame: Frame) -> images.Image | None:
-        """The draft that is the picture, in finer pixels, if there is time for that."""
+        """The draft that is the picture, in finer pixels, if there is time for that and no lens blurs what it shows."""
+        if frame.snapshot.camera.aperture is not None:
+            return None
         x0, y0, x1, y1 = self._begun_for[2]
         pixels = (x1 - x0) * (y1 - y0)
-        scale = self.guides.scale(pixels, self.scale, self.step)
+        scale = self.guides.scale(pixels, self.scale, max(self.step, self._sample_seconds))
         if scale is None:
             return None
         started, fresh = time.perf_counter(), library.news()
@@ -259,7 +261,8 @@ class Viewport:
             film, width=film.width * finer, height=film.height * finer, border=tuple(finer * e for e in film.border)
         )
         view = View(frame.snapshot.camera, whole, self.renderer.geometry.origin)
-        self.guide.draw(self._snapshot, self.renderer.geometry, self.renderer.materials.compiled, view)
+        scene = self._snapshot, self.renderer.geometry, self.renderer.materials.compiled
+        self.guide.draw(*scene, view, guides=True)
         refined = self.guide.refined(self.picture, film.exposure)
         images.finish()
         if library.news() == fresh:

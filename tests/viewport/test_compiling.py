@@ -6,6 +6,9 @@ import pytest
 
 from addon import viewport
 from addon.gfx import images, library
+from addon.scene.view import View
+from addon.surfaces.first_look import HEADLIGHT, FirstLook
+from addon.ui import ENGINE
 from tests.viewport.region import SIZE, Region
 
 
@@ -76,9 +79,6 @@ def test_another_view_meanwhile_is_a_first_look_at_it(cold):
 
 def test_first_look_at_a_lambertian_plane_under_a_sun(registered, gpu_context, empty_scene):
     """Radiance of a surface that faces the sun: albedo times (irradiance + that of the light at the eye) over pi."""
-    from addon.surfaces.first_look import HEADLIGHT
-    from addon.ui import ENGINE
-
     bpy.ops.mesh.primitive_plane_add(size=8)
     material = bpy.data.materials.new("Red")
     material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.6, 0.2, 0.1, 1.0)
@@ -96,3 +96,30 @@ def test_first_look_at_a_lambertian_plane_under_a_sun(registered, gpu_context, e
     region.viewport.release()
     expected = np.array([0.6, 0.2, 0.1]) * (3.0 / np.pi + HEADLIGHT)
     np.testing.assert_allclose(seen[:3], expected, rtol=0.01)
+
+
+@pytest.mark.parametrize(("opacity", "guides"), [("glass", 1.0), ("alpha", 0.0)])
+def test_what_lets_pass_hides_every_other_pixel_and_guides_by_its_shape_if_it_has_one(scene, opacity, guides):
+    """A cube of glass, or of alpha 0.5: half of its pixels in a first look; as a guide all of them, or none."""
+    material = bpy.data.materials.new("Clear")
+    shader = material.node_tree.nodes["Principled BSDF"]
+    name, value = {"glass": ("Transmission Weight", 1.0), "alpha": ("Alpha", 0.5)}[opacity]
+    shader.inputs[name].default_value = value
+    cube = bpy.data.objects["Cube"]
+    cube.data.materials.append(material)
+    bpy.data.objects["Plane"].hide_render = bpy.data.objects["Plane"].hide_viewport = True
+    region = Region()
+    region.clock.tick = viewport.BUDGET_S
+    library._shaders.clear()
+    region.draw()
+    looked = region.viewport
+    covered = {}
+    for guide in (False, True):
+        look = FirstLook()
+        view = View(region.camera, looked._snapshot.film, looked.renderer.geometry.origin)
+        look.draw(looked._snapshot, looked.renderer.geometry, looked.renderer.materials.compiled, view, guides=guide)
+        covered[guide] = (images.read(look.guide)[..., 3] > 0).mean()
+        look.release()
+    looked.release()
+    assert 0.01 < covered[False] < 0.6
+    assert covered[True] == pytest.approx(2.0 * covered[False] * guides, rel=0.1, abs=1e-6)
