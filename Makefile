@@ -11,7 +11,7 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-all test-fast test-vulkan stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport bench-beside clean
+.PHONY: help environment demo pictures samples test test-all test-fast test-vulkan stress check matrix mutations package site test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport bench-beside clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
@@ -68,6 +68,11 @@ package: environment ## the extension as a zip, in build/
 
 stress: environment ## random scenes against what must be true of every picture (STRESS=number of scenes)
 	CANDELA_STRESS=$(STRESS) $(PYTHON) -m pytest tests/stress tests/techniques/test_stability.py
+
+site: ## the manual as a website, in build/site
+	test -x .venv-site/bin/mkdocs || { $(PYTHON3) -m venv .venv-site && .venv-site/bin/python -m pip install --quiet mkdocs==1.6.1; }
+	.venv-site/bin/mkdocs build --quiet --config-file tools/site.yml
+	@echo build/site/index.html
 
 test-window: package ## the packaged extension in a real Blender with a window (REAL_BLENDER=command)
 	$(PYTHON) -m pytest -m window tests/window
