@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from functools import cache
 
@@ -42,10 +43,24 @@ def refracts(frame: Frame) -> bool:
     return frame.plan.fills("transmission")
 
 
-def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, glass: bool) -> None:
+class BothWays(ABC):
+    """What a technique is that may follow what smooth glass mirrors and what it lets pass in each sample."""
+
+    @abstractmethod
+    def follows_both_ways(self, frame: Frame) -> bool:
+        """Whether it does in this picture, known before its first sample."""
+
+
+def goes_both_ways(frame: Frame) -> bool:
+    """Whether smooth glass that the camera sees is kept as one lobe that lets through and mirrors."""
+    asked = (one for one in frame.plan.techniques if isinstance(one, BothWays))
+    return refracts(frame) and any(one.follows_both_ways(frame) for one in asked)
+
+
+def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, glass: int) -> None:
     """Draw what the camera sees into six surface images with a depth buffer. `mode` says what becomes of transparent
-    layers: STOCHASTIC, OPAQUE, LEFT_OUT, or FROM_OPACITY plus thousandths of opacity. `glass`: it is drawn as a
-    surface, and is no such layer."""
+    layers: STOCHASTIC, OPAQUE, LEFT_OUT, or FROM_OPACITY plus thousandths of opacity. `glass`: 1 it is drawn as a
+    surface, and is no such layer; 2 so, as one lobe (goes_both_ways)."""
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What reaches the eye where nothing is hit:
     images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
@@ -54,7 +69,7 @@ def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mod
     frame.count(technique, "passes")
 
 
-def drawing_constants(mode: int, glass: bool) -> dict[str, int]:
+def drawing_constants(mode: int, glass: int) -> dict[str, int]:
     """Of the programs that draw surfaces, beside the first instance."""
     return {"transparent_mode": mode, "glass_bends": int(glass), "index_shown": -1}
 
@@ -115,7 +130,7 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
 
 def _draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
     glass = refracts(frame)
-    draw_surfaces(frame, technique, target, STOCHASTIC, glass)
+    draw_surfaces(frame, technique, target, STOCHASTIC, 2 if goes_both_ways(frame) else int(glass))
     tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted or material.added}
     if not tinted:
         return

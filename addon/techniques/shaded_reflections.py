@@ -8,8 +8,9 @@ which is traced, of other surfaces by virtual lights. Where what is met is itsel
 
 Both a ray and a point may find the same light: they are weighted by the power heuristic (Veach 1997). What the first
 surface reflects of lamps and the world is left to traced_glossy.py, and what it lets pass of them to
-traced_refraction.py, whose walks by mean colours this technique replaces. Of several lobes of a surface one is kept per
-sample, so a pane shows both its reflection and the view.
+traced_refraction.py, whose walks by mean colours this technique replaces. Of smooth glass (Glass, and
+Principled's Transmission; roughness up to BOTH_ROUGHNESS) both ways are followed in each sample, what it lets pass and
+what it mirrors; of other lobes of a surface one is kept, and at what rays have met, too.
 
 | cost | per sample and bounce |
 |---|---|
@@ -58,6 +59,8 @@ from ..surfaces.draw import (
     MARKS,
     SOFT_DEFINES,
     SURFACE_TEXTURES,
+    BothWays,
+    goes_both_ways,
     refracts,
     surface_bindings,
 )
@@ -78,6 +81,7 @@ REACH = (
 )
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
+BOTH_ROUGHNESS = 0.3  # of glass of which both ways are followed, as in lib/closure.glsl
 ORDERS = ("direct", "indirect")
 MOST_PARTS = 6  # bounces that have turns of their own (frame/shares.py); later ones have those of the last
 
@@ -99,6 +103,7 @@ def scatter_program(onward: bool) -> Program:
             ("FLOAT", "offset_size"),
             ("FLOAT", "clear_roughness"),
             ("FLOAT", "first_rays"),
+            *(() if onward else (("INT", "mirrored_way"),)),
         ),
         defines=(("ONWARD", "1"),) if onward else (),
         outputs=(
@@ -161,7 +166,7 @@ PROGRAMS = (
 )
 
 
-class ShadedReflections(Technique):
+class ShadedReflections(Technique, BothWays):
     name = "shaded_reflections"
     label = "Shaded reflections"
     params = (
@@ -197,7 +202,7 @@ class ShadedReflections(Technique):
         )  # fmt: skip
         self._active = False
         self._first_rays = 0.0
-        self._turns = Turns(self, MOST_PARTS)
+        self._turns, self._mirror_turns = Turns(self, MOST_PARTS), Turns(self, MOST_PARTS)  # of the ways of glass
         self._onward = True  # whether rays may go on from what they meet
         self._into: dict[str, images.Image] = {}  # what this bounce adds to, by name
 
@@ -215,8 +220,7 @@ class ShadedReflections(Technique):
 
     def begin(self, frame: Frame) -> None:
         """Tell the techniques that gather indirect light and walk through glass what this one takes over."""
-        gathers = any(GatherBindings in technique.provides for technique in frame.plan.techniques)
-        self._active = gathers or not frame.plan.fills("indirect")
+        self._active = self._follows(frame)
         if self._active:
             frame.provide(ShadedLobes(frame.settings.get(self, "roughness")))
             self._sources.begin(frame)
@@ -228,12 +232,27 @@ class ShadedReflections(Technique):
             if not self._onward:
                 frame.chose(self, "rays", f"1 bounce, because no material is smoother than {ONWARD_ROUGHNESS:g}")
         guide = (SHOWN,) if frame.settings.samples > 1 else ()
-        self._turns.begin(frame, (*_names(refracts(frame), ORDERS), *guide))
+        for turns in (self._turns, self._mirror_turns):
+            turns.begin(frame, (*_names(refracts(frame), ORDERS), *guide))
+
+    def follows_both_ways(self, frame: Frame) -> bool:
+        """Where its rays are in use, glass is smooth, and no edit turns what that mirrors apart from what it bends."""
+        glass = [one.glass for one in frame.materials.compiled if one.glass]
+        smooth = any(one.fresnel and one.roughness <= BOTH_ROUGHNESS for one in glass)
+        wide = frame.settings.get(self, "roughness") >= BOTH_ROUGHNESS
+        return self._follows(frame) and smooth and wide and not frame.plan.runs("reflection_editing")
+
+    @staticmethod
+    def _follows(frame: Frame) -> bool:
+        gathers = any(GatherBindings in technique.provides for technique in frame.plan.techniques)
+        return gathers or not frame.plan.fills("indirect")
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
             return
-        if not self._turns.weight(frame):
+        turns = (self._turns, self._mirror_turns) if goes_both_ways(frame) else (self._turns,)
+        ways = [(way, one) for way, one in enumerate(turns) if one.weight(frame)]
+        if not ways:
             frame.kept(CausticMaps).done()
             return
         hits, transmission = frame.kept(Hits), refracts(frame)
@@ -254,37 +273,40 @@ class ShadedReflections(Technique):
         records = Records.take(frame.size)
         closures = take_closures(frame.size, records.target.depth)
         try:
-            self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {})
-            yield
-            with self._turns.drawing(frame) as drawing:
-                for number in range(rounds):
-                    round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
-                    met = hits.trace(frame, self, rays.colors[:2], records, number=number)
-                    yield
-                    hits.shade(frame, self, rays.colors[1], records, met, closures, number, masked=True)
-                    yield
-                    self._into = drawing.images(number)
-                    self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
-                    self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
-                    if not met:
+            for way, turns in ways:
+                self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {}, way)
+                yield
+                with turns.drawing(frame) as drawing:
+                    for number in range(rounds):
+                        round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
+                        met = hits.trace(frame, self, rays.colors[:2], records, number=number)
+                        yield
+                        yield from hits.shading(
+                            frame, self, rays.colors[1], records, met, closures, number, masked=True
+                        )
+                        yield
+                        self._into = drawing.images(number)
+                        self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
+                        self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                        if not met:
+                            drawing.done(number)
+                            break
+                        self._add_guide(frame, rays, records, closures, round_)
+                        self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                        if caustics:
+                            self._add_caustics(frame, caustics, rays, records, closures, transmission)
                         drawing.done(number)
-                        break
-                    self._add_guide(frame, rays, records, closures, round_)
-                    self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
-                    if caustics:
-                        self._add_caustics(frame, caustics, rays, records, closures, transmission)
-                    drawing.done(number)
-                    yield
-                    if number + 1 == rounds or not self._turns.weight(frame, number + 1):
-                        break
-                    before = {
-                        "met_origin": rays.colors[0], "met_direction": rays.colors[1], "met_path": rays.colors[2],
-                        "met_travelled": rays.colors[3],
-                        "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
-                    }  # fmt: skip
-                    bound = closure_bindings(closures)
-                    self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
-                    rays, onward = onward, rays
+                        yield
+                        if number + 1 == rounds or not turns.weight(frame, number + 1):
+                            break
+                        before = {
+                            "met_origin": rays.colors[0], "met_direction": rays.colors[1], "met_path": rays.colors[2],
+                            "met_travelled": rays.colors[3],
+                            "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
+                        }  # fmt: skip
+                        bound = closure_bindings(closures)
+                        self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
+                        rays, onward = onward, rays
         finally:  # also where a viewport drops the sample
             for image in (*rays.colors, *onward.colors, *closures.colors):
                 images.pool.give(image)
@@ -296,8 +318,8 @@ class ShadedReflections(Technique):
     def _take(frame: Frame) -> images.Target:
         return images.Target(tuple(images.pool.take(*frame.size, layout) for layout, _ in STATE))
 
-    def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before) -> None:
-        """Rays of the lobes of `surfaces`, into `rays`."""
+    def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before, way: int = 0) -> None:
+        """Rays of the lobes of `surfaces`, into `rays`. `way` 1, of the first: what glass mirrors, too."""
         images.Target(rays.colors[1:2]).clear()  # a ray without direction is none, whatever else stands there
         passes.fullscreen(
             scatter_program(bool(before)),
@@ -308,7 +330,7 @@ class ShadedReflections(Technique):
             constants={
                 **reach, "ray_number": number, "offset_size": frame.offset_size,
                 "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
-                "first_rays": self._first_rays,
+                "first_rays": self._first_rays, **({} if before else {"mirrored_way": way}),
             },
         )  # fmt: skip
         frame.count(self, "passes")
@@ -409,6 +431,7 @@ class ShadedReflections(Technique):
     def release(self) -> None:
         self._sources.release()
         self._turns.drop()
+        self._mirror_turns.drop()
 
 
 def _state(rays: images.Target) -> dict[str, images.Image]:

@@ -18,6 +18,7 @@ struct Seen {
   bool soft;    // with a diffuse lobe in it
   int kind;     // of the other lobe
   vec3 weight;  // of it, times about what it reflects towards the viewer; 0: there is none
+  vec3 mirror;  // the same of what glass mirrors that goes both ways
 };
 
 // About what share of the light a lobe reflects towards the viewer. Of several lobes of a surface each pixel has drawn one:
@@ -48,6 +49,13 @@ Seen seen_of(Surface s)
   seen.soft = max_component(s.glossy_weight) > 0.0 && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
   seen.color = max(s.diffuse, vec3(0.0)) + (seen.soft ? s.glossy_weight : vec3(0.0));
   seen.weight = seen.soft ? vec3(0.0) : s.glossy_weight * lobe_reflectance(s);
+  seen.mirror = vec3(0.0);
+#ifdef TRANSMISSION
+  if (surface_goes_both_ways(s)) {
+    Surface mirrored = surface_mirrored(s);
+    seen.mirror = mirrored.glossy_weight * lobe_reflectance(mirrored);
+  }
+#endif
   return seen;
 }
 
@@ -171,6 +179,8 @@ Reflected reflected(ivec2 pixel)
   Arriving same_lobe = none;
   Arriving nearby_lobe = none;
 #ifdef TRANSMISSION
+  Arriving same_mirror = none;
+  Arriving nearby_mirror = none;
   bool refracts = here.kind == LOBE_REFRACTION;
 #endif
 #ifdef REPEATED
@@ -237,6 +247,19 @@ Reflected reflected(ivec2 pixel)
           }
           // Of a highlight that only what faces another way is known to show, hardly anything is taken.
           arriving_add(nearby_lobe, direct, indirect, there.weight, similar, weight);
+#ifdef TRANSMISSION
+          if (max_component(here.mirror) > 0.0) {
+            direct = light_glossy_direct_fetch(other).rgb;
+            indirect = light_glossy_indirect_fetch(other).rgb;
+            if (equal) {
+              arriving_add(same_mirror, direct, indirect, there.mirror, weight, weight);
+#ifdef REPEATED
+              spread_add(lobe_spread, direct, there.mirror, facing > LIKE);
+#endif
+            }
+            arriving_add(nearby_mirror, direct, indirect, there.mirror, similar, weight);
+          }
+#endif
         }
       }
     }
@@ -264,6 +287,12 @@ Reflected reflected(ivec2 pixel)
     float share = luminance(here.weight) / max(luminance(seen_there(nearest).weight), 1e-6);
     light.transmission_direct = vec4(direct, light_transmission_direct_fetch(nearest).a * min(share, 4.0));
     light.transmission_indirect = vec4(indirect, light_transmission_indirect_fetch(nearest).a * min(share, 4.0));
+    arriving_mean(same_mirror, nearby_mirror, direct, indirect);
+    light.glossy_direct.rgb = here.mirror * direct;
+    light.glossy_indirect.rgb = here.mirror * indirect;
+#ifdef REPEATED
+    light.glossy_direct.rgb *= own ? 1.0 : 0.0;
+#endif
     return light;
   }
 #endif

@@ -60,7 +60,8 @@ void main()
         share = glass_passing(s.glossy_tint, mu, s.glossy_roughness, s.glossy_ior);
       }
       out_transmission_color.rgb = s.glossy_weight * share;
-      microfacets = false;
+      microfacets = surface_goes_both_ways(s);
+      s = surface_mirrored(s);
     }
     if (microfacets) {
       float mu = max(dot(s.glossy_normal, -direction), 0.0);

@@ -18,6 +18,14 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
+#ifndef ONWARD
+  if (mirrored_way != 0) {  // of glass that goes both ways; the other way all lobes go
+    if (!surface_goes_both_ways(s)) {
+      return;
+    }
+    s = surface_mirrored(s);
+  }
+#endif
 #ifdef ONWARD
   vec3 viewer = -met_direction_fetch(pixel).xyz;
   float width = hit_place_fetch(pixel).w;

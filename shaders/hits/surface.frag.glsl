@@ -12,6 +12,8 @@
 // Where the values of the material begin that is met here: an expression, since Metal has no globals.
 #define MET_MATERIAL_BASE shared_base(int(hit_material_fetch(ivec2(gl_FragCoord.xy)).r + 0.5))
 #endif
+// Inside glass what it mirrors is no brighter than what it lets pass: asked for seldom, it would be grain.
+#define LEAST_MIRRORED 0.05
 #include "generated/material"
 #include "hits/point.glsl"
 #ifdef OWN_SURFACE

@@ -20,6 +20,23 @@
 // No lobe, weight 0; what its numbers in the surface images are then: grass/surface.glsl.
 #define SURFACE_GRASS 8
 
+
+// Smooth glass may be kept as one lobe that lets through and mirrors: a LOBE_REFRACTION whose edge says how much it
+// mirrors beside, in shares of its weight. x, above the 0.5 that tells Fresnel's losses: 1 nothing, BOTH_COLORED by its
+// colour, BOTH_GREY by the largest channel; y, z: high and low part of the share.
+#define BOTH_COLORED (96.0 / 127.0)
+#define BOTH_GREY (112.0 / 127.0)
+#define BOTH_STEPS 16383.0
+#define BOTH_MOST 4.0        // the largest share
+#define BOTH_ROUGHNESS 0.3   // of glass that is kept so
+
+vec3 both_ways_edge(float share, bool colored)
+{
+  float code = floor(clamp(share / BOTH_MOST, 0.0, 1.0) * BOTH_STEPS + 0.5);
+  float high = floor(code / 128.0);
+  return vec3(colored ? BOTH_COLORED : BOTH_GREY, high / 127.0, (code - 128.0 * high) / 127.0);
+}
+
 float dielectric_f0(float ior)
 {
   float root = (ior - 1.0) / (ior + 1.0);

@@ -5,7 +5,8 @@
 //             triangle (zw; in the last bits smooth_lift)
 //   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each
 //   tint      weight of the lobe; w: square root of its reflectance at normal incidence, 8 bits each
-//   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each); w: ior, below 0
+//   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each), of glass
+//             what both_ways_edge says; w: ior, below 0
 //             for distributions other than GGX with multiple scattering
 //   emission  radiance; w: roughness of the lobe; of a translucent one, which has none, how far below (smooth_lift)
 //
@@ -257,6 +258,25 @@ bool surface_is_edited(Surface s)
 #else
   return false;
 #endif
+}
+
+// Whether the lobe is of glass that mirrors, too (both_ways_edge).
+bool surface_goes_both_ways(Surface s)
+{
+  return s.kind == LOBE_REFRACTION && s.glossy_edge.x > 0.6 && s.glossy_edge.x < 0.95;
+}
+
+// The surface with what such glass mirrors as its lobe; others as they are.
+Surface surface_mirrored(Surface s)
+{
+  if (surface_goes_both_ways(s)) {
+    float code = floor(s.glossy_edge.y * 127.0 + 0.5) * 128.0 + floor(s.glossy_edge.z * 127.0 + 0.5);
+    float share = code * (BOTH_MOST / BOTH_STEPS);
+    s.glossy_weight = share * ((s.glossy_edge.x > 0.82) ? vec3(max_component(s.glossy_weight)) : s.glossy_weight);
+    s.kind = FRESNEL_DIELECTRIC;
+    s.glossy_edge = vec3(1.0);
+  }
+  return s;
 }
 
 // Whether what comes from `direction` may be mirrored: from above the triangle, or where an edit has turned it.

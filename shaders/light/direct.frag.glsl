@@ -62,7 +62,7 @@ void main()
   if (surface_position_fetch(pixel).w == 0.0) {
     return;
   }
-  Surface s = SURFACE_READ(pixel);
+  Surface s = surface_mirrored(SURFACE_READ(pixel));
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   GrassSeen grass = grass_see(pixel, s);
   bool has_diffuse = max_component(s.diffuse) > 0.0;

@@ -58,7 +58,7 @@ void main()
   if (surface_position_fetch(pixel).w == 0.0 || max_component(surface_tint_fetch(pixel).rgb) <= 0.0) {
     return;
   }
-  Surface s = SURFACE_READ(pixel);
+  Surface s = surface_mirrored(SURFACE_READ(pixel));
   if (s.glossy_roughness > traced_roughness || s.kind > FRESNEL_F82) {
     return;
   }

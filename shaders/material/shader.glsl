@@ -269,6 +269,15 @@ void shader_holdout(inout Closures closures, SurfacePoint point, vec3 weight)
   closures.holdout += vector_average(weight);
 }
 
+// Whether smooth glass is kept as one lobe that mirrors, too: of what the camera sees, where rays follow both.
+#ifndef BOTH_WAYS
+#define BOTH_WAYS false
+#endif
+// How often glass at least mirrors that is asked for one way.
+#ifndef LEAST_MIRRORED
+#define LEAST_MIRRORED 0.25
+#endif
+
 // Glass: a rough dielectric that mirrors and lets through. What passes is a lobe of its own where the program draws what
 // is bent, and else goes straight on, tinted, with the same energy. `tint` colours the reflectance at normal incidence.
 void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 reflected, vec3 transmitted,
@@ -285,10 +294,26 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
   if (distribution == DISTRIBUTION_MULTI_GGX) {
     scale *= glass_multiscatter(transmitted, mu, r, ior);
   }
+  if (BOTH_WAYS && point.refracts && r <= BOTH_ROUGHNESS && largest(reflected) > 0.0) {
+    // As one lobe, so that no sample lacks either of the two.
+    vec3 mirror = scale * reflected / multiscatter_scale(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, mu);
+    vec3 passing = scale * max(transmitted, vec3(0.0));
+    vec3 share = mirror / max(passing, vec3(1e-6));
+    float most = largest(mirror);
+    float share_of_most = most / max(largest(passing), 1e-6);
+    bool colored = largest(abs(share - vec3(share.x))) < 2e-3 * share.x;
+    bool grey = largest(abs(mirror - vec3(most))) < 2e-3 * most;
+    float ratio = colored ? share.x : share_of_most;
+    if ((colored || grey) && ratio < BOTH_MOST) {
+      closure_glossy(closures, passing, 1.0, LOBE_REFRACTION, f0, both_ways_edge(ratio, colored), ior, r, 0.0,
+                     default_tangent(n), n);
+      return;
+    }
+  }
   if (largest(reflected) > 0.0) {
     vec3 lobe_scale = multiscatter_scale(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, mu);
     // What little glass mirrors is often the brightest in view: kept more often than its albedo asks for.
-    float importance = max(color_luminance(mirrored), point.refracts ? 0.25 : 0.0);
+    float importance = max(color_luminance(mirrored), point.refracts ? LEAST_MIRRORED : 0.0);
     closure_glossy(closures, scale * reflected / lobe_scale, importance, FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, 0.0,
                    default_tangent(n), n);
   }

@@ -4,6 +4,7 @@
 #include "lib/random.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/instance.glsl"
+#define BOTH_WAYS (glass_bends == 2)
 #include "generated/material"
 #include "surface/point.glsl"
 #include "surface/store.glsl"

@@ -230,3 +230,28 @@ def test_scenes_without_glass_pay_nothing(stage):
     stage.camera_above()
     stage.render(1, SIZE)
     assert stage.ledger.row("traced_refraction").reason == "no material is glass"
+
+
+@pytest.mark.parametrize("kind", ["glass", "principled"])
+def test_each_sample_of_smooth_glass_shows_what_it_mirrors_and_what_it_lets_pass(stage, kind):
+    """One sample: in every pixel Fresnel's share of the world above, and the rest of a lit wall behind, with colours
+    of the node; no pixel shows one of them alone."""
+    color = (0.25, 0.5, 0.81)
+    made = (
+        stage.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0, Color=(*color, 1.0))
+        if kind == "glass"
+        else stage.principled(Roughness=0.0, IOR=1.5, Transmission_Weight=1.0, Base_Color=(*color, 1.0))
+    )
+    stage.rectangle((-99, -99), (99, 99), material=made)
+    stage.rectangle((-99, -99), (99, 99), z=-2.0, material=stage.material("ShaderNodeEmission", Strength=3.0))
+    stage.world()
+    tilted_camera(stage, 60)
+    for samples in (1, 2):
+        images = stage.render(samples, SIZE, bounces=2)
+        share = fresnel(0.5, 1.5)
+        mirrored = (images["glossy_direct"] + images["glossy_indirect"])[..., :3] * images["glossy_color"][..., :3]
+        passing_it = passing(images) + passing(images, "indirect")
+        own, through = (color, color) if kind == "glass" else (np.ones(3), np.sqrt(color))
+        np.testing.assert_allclose(mirrored, np.broadcast_to(share * np.array(own), mirrored.shape), rtol=0.01)
+        expected = 3.0 * (1.0 - share) * np.array(through)
+        np.testing.assert_allclose(passing_it, np.broadcast_to(expected, passing_it.shape), rtol=0.01)
