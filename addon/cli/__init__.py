@@ -73,7 +73,10 @@ def _end(sentence: str, code: int) -> int:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str):
-        raise Refused(f"{message[:1].upper()}{message[1:].rstrip('.')} (see --help).", USAGE)
+        hint = (
+            "; a value that begins with a dash is written --option=-value" if "expected one argument" in message else ""
+        )
+        raise Refused(f"{message[:1].upper()}{message[1:].rstrip('.')}{hint} (see --help).", USAGE)
 
 
 def _parser(program: str) -> argparse.ArgumentParser:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -144,6 +145,10 @@ class Settings:
                     f"'{name}' is a setting of each {kind}, not of the picture: set it on the {kind} in the file."
                 )
             else:
-                known = ", ".join([*own, *slots, *table])
-                raise ValueError(f"There is no setting '{name}'. Known settings: {known}.")
+                known = [*own, *slots, *table]
+                near = difflib.get_close_matches(name.replace("_", ".", 1), known, 3) or difflib.get_close_matches(
+                    name, [one.rpartition(".")[2] for one in known], 3
+                )
+                meant = f" Did you mean {' or '.join(near)}?" if near else ""
+                raise ValueError(f"There is no setting '{name}'.{meant} Known settings: {', '.join(known)}.")
         return settings
