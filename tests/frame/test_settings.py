@@ -61,8 +61,10 @@ def test_a_text_fills_a_slot():
         ("rays.count", "'rays.count' is not of the form name=value"),
         (
             "rays.counts=2",
-            "There is no setting 'rays.counts'. Did you mean rays.count.*"
-            "Known settings: samples, seed, bounces, .*rays.count",
+            (
+                "There is no setting 'rays.counts'. Did you mean rays.count.*"
+                "Known settings: samples, seed, bounces, .*rays.count"
+            ),
         ),
         ("rays.count=many", "'count' needs a whole number, not 'many'"),
         ("rays.count=0", "'count' must be at least 1, not 0"),
