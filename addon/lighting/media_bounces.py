@@ -37,6 +37,7 @@ from . import froxels
 MANY = 64  # samples: below, light is found in cells, and at a few surfaces
 WIDE, SMALL = 64, 32  # pixels along the shorter side: in smaller pictures cells were much of what is seen
 STRIDE, SMALL_STRIDE = 4, 2  # pixels between surfaces that are asked
+MOST_STEPS, EVERY = 12, 1 << 20  # of walks from surfaces; scatterings where steps alone are counted
 FEW, FEW_WALKS, WALKS = 8, 4, 2  # samples: below, more walks of each start
 LIT_TEXTURES = (*acceleration.HIERARCHY_TEXTURES, *MEDIA_TEXTURES)
 WORLD_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_map"))
@@ -71,10 +72,11 @@ def _shining(shining: bool) -> tuple[tuple[str, str], ...]:
 
 
 @cache
-def walks_program(start: str, kinds: int, world: bool, shining: bool, one_step: bool) -> Program:
-    """Finds light along walks. `shining`: and apart from it what comes straight from media that shine."""
+def walks_program(start: str, kinds: int, world: bool, shining: bool, once: bool) -> Program:
+    """Finds light along walks. `shining`: and apart from it what comes straight from media that shine; `once`: media
+    scatter it once."""
     return passes.fullscreen_program(
-        f"walks in media from {start}{', one step' if one_step else ''}",
+        f"walks in media from {start}{', scattered once' if once else ''}",
         "media/indirect.frag.glsl",
         textures=(
             *LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "reflectance"),
@@ -82,11 +84,11 @@ def walks_program(start: str, kinds: int, world: bool, shining: bool, one_step: 
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
         constants=(
-            *CONSTANTS, ("INT", "is_spread"), ("INT", "walks"), ("INT", "bounces"),
+            *CONSTANTS, ("INT", "is_spread"), ("INT", "walks"), ("INT", "bounces"), ("INT", "scatters"),
             *(froxels.CONSTANTS if start == CELLS else ()),
         ),
         defines=(
-            *defines_of(kinds, world), *START[start], *_shining(shining), *((("ONE_STEP", "1"),) if one_step else ()),
+            *defines_of(kinds, world), *START[start], *_shining(shining), *((("ONE_SCATTER", "1"),) if once else ()),
         ),
         outputs=(("VEC4", "out_found"), *((("VEC4", "out_straight"),) if shining else ())),
     )  # fmt: skip
@@ -135,7 +137,7 @@ class MediaBounces:
         self, frame: Frame, technique: Technique, media: Media, lit: Lit, asked: dict[str, object], bounces: int
     ) -> Iterator[None]:
         """`asked`: values of CONSTANTS but the pixel's; `bounces`: before a medium scatters light to the eye. Surfaces
-        get light that media have scattered once more than that, as in Cycles."""
+        get light that media have scattered once more than that, as in Cycles, between any number of surfaces."""
         self._reflectance.update(frame)
         spread = frame.settings.samples < MANY and min(frame.size) >= SMALL
         self._walks = FEW_WALKS if frame.settings.samples < FEW else WALKS
@@ -148,7 +150,14 @@ class MediaBounces:
         names = _names("volume", media.emits)
         program = walks_program(PIXELS, lit.kinds, lit.world, media.emits, False)
         bound = self._bound(frame, lit, program)
-        constants = asked | {"shown_pixel": (0, 0), "stride": 1, "is_spread": 0, "walks": 1, "bounces": bounces}
+        constants = asked | {
+            "shown_pixel": (0, 0),
+            "stride": 1,
+            "is_spread": 0,
+            "walks": 1,
+            "bounces": bounces,
+            "scatters": EVERY,
+        }
         target = frame.target(*names)
         for band in frame.bands(technique, names[0]):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, constants=constants, **bound)
@@ -160,7 +169,14 @@ class MediaBounces:
         found = grid.take(1 + media.emits)
         program = walks_program(CELLS, lit.kinds, lit.world, media.emits, False)
         constants = asked | grid.constants
-        constants |= {"shown_pixel": (0, 0), "stride": 1, "is_spread": 1, "walks": self._walks, "bounces": bounces}
+        constants |= {
+            "shown_pixel": (0, 0),
+            "stride": 1,
+            "is_spread": 1,
+            "walks": self._walks,
+            "bounces": bounces,
+            "scatters": EVERY,
+        }
         passes.fullscreen(
             program, images.Target(found), constants=constants, **self._bound(frame, lit, program)
         )  # fmt: skip
@@ -179,11 +195,14 @@ class MediaBounces:
         frame.count(technique, "walks", grid.size[0] * grid.size[1])
         yield
 
-    def _onto_surfaces(self, frame, technique, media, lit, asked, bounces, spread) -> Iterator[None]:
+    def _onto_surfaces(self, frame, technique, media, lit, asked, scatters, spread) -> Iterator[None]:
         names = _names("diffuse", media.emits)
-        program = walks_program(ON_SURFACES, lit.kinds, lit.world, media.emits, bounces == 1)
+        program = walks_program(ON_SURFACES, lit.kinds, lit.world, media.emits, scatters == 1)
         bound = self._bound(frame, lit, program)
-        constants = asked | {"is_spread": int(spread), "walks": self._walks if spread else 1, "bounces": bounces}
+        constants = asked | {
+            "is_spread": int(spread), "walks": self._walks if spread else 1, "scatters": scatters,
+            "bounces": min(frame.settings.bounces, MOST_STEPS),
+        }  # fmt: skip
         if not spread:
             constants |= {"shown_pixel": (0, 0), "stride": 1}
             target = frame.target(*names)

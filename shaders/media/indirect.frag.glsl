@@ -1,9 +1,10 @@
 // Light that media scatter after other bounces, and that they bring to surfaces: `walks` of up to `bounces` steps.
 //
-// FROM_SURFACES: walks start at the surface that a pixel shows, whose irradiance they find (of what media scatter; light of
-// other surfaces is not their matter). FROM_FROXELS: they start anywhere in a cell of the grid along the view (froxels.glsl),
+// FROM_SURFACES: walks start at the surface that a pixel shows, whose irradiance they find: of paths that media scatter, up
+// to `scatters` times; light that has met surfaces alone is not their matter. FROM_FROXELS: they start anywhere in a cell of the grid along the view (froxels.glsl),
 // and find the light that a medium there would send to the eye for each unit of its scattering coefficient. Else they start
-// at a place on a pixel's view ray. ONE_STEP: `bounces` is 1. Each asks one row of lights, drawn evenly. At each stop it looks once
+// at a place on a pixel's view ray. ONE_SCATTER: `scatters` is 1, so
+// that walks go on over surfaces alone. Each asks one row of lights, drawn evenly. At each stop it looks once
 // for a place in media that the row lights: drawn along rays of the lamp (media/from_lamps.glsl) or by the phase function or
 // cosine and around the lamp, weighted by the balance heuristic. Then it goes on by phase function or cosine, to a place in
 // media drawn by what they let pass, or to a surface, where the row is asked.
@@ -15,15 +16,10 @@
 #include "media/froxels.glsl"
 #endif
 
-#ifdef ONE_STEP
-#define MORE_STEPS false
+#ifdef ONE_SCATTER
+#define SCATTERS_ON false
 #else
-#define MORE_STEPS true
-#endif
-#if defined(SHINING) || !defined(ONE_STEP)
-#define GOES_ON true
-#else
-#define GOES_ON false
+#define SCATTERS_ON true
 #endif
 
 vec3 mean_albedo(ivec2 hit)
@@ -134,8 +130,8 @@ float rows_stood_for(int number)
 #endif
 }
 
-// What a walk brings back that sets out from a stop with this weight, of row `number` of lights. `media_only`: a surface that
-// it meets first ends it. `straight`: what comes straight from media that shine, as light of lamps does.
+// What a walk brings back that sets out from a stop with this weight, of row `number` of lights. `media_only`: of paths that meet a
+// medium. `straight`: what comes straight from media that shine, as light of lamps does.
 vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, vec2 first_turn, inout uint seed,
           out vec3 straight)
 {
@@ -144,13 +140,13 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
   LampRays rays = lamp_rays(number, ask_turn);
   bool lit_exists = false;
   vec3 lit = vec3(0.0);  // the surface where a ray of the lamp ends
-  int task = (MORE_STEPS && rays.shadow) ? FIND_LIT : LOOK;
+  int task = (SCATTERS_ON && rays.shadow) ? FIND_LIT : LOOK;
+  int scattered_times = 0;
   int bounce = 0;
-  int rounds = MORE_STEPS ? 3 * bounces + 1 : (GOES_ON ? 2 : 1);
-  for (int i = 0; i < rounds && bounce < bounces; i++) {
-    int doing = (MORE_STEPS || (GOES_ON && task == GO_ON)) ? task : LOOK;
-    bool first_surface = !(media_only && bounce == 0);
-    task = (doing == FIND_LIT) ? LOOK : ((doing == LOOK) ? (lit_exists && first_surface ? LOOK_AT_LIT : GO_ON)
+  for (int i = 0; i < 3 * bounces + 1 && bounce < bounces; i++) {
+    int doing = task;
+    bool after_media = !media_only || scattered_times > 0;
+    task = (doing == FIND_LIT) ? LOOK : ((doing == LOOK) ? (lit_exists && after_media ? LOOK_AT_LIT : GO_ON)
                                                         : ((doing == LOOK_AT_LIT) ? GO_ON : LOOK));
     vec2 turn = vec2(media_random(seed), media_random(seed));
 #ifdef WORLD_LIT
@@ -164,15 +160,15 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     vec3 from = stop.position;
     float wanted = -1.0;
     vec3 way;
-    bool more = MORE_STEPS && doing == GO_ON && bounce + 1 < bounces;
+    bool more = SCATTERS_ON && doing == GO_ON && bounce + 1 < bounces;
     LampRays aiming = rays;
     aiming.wide = (doing == GO_ON) ? 0.5 : 0.0;
     float aimed = !rays.exist ? 0.0 : ((doing == LOOK) ? 0.5 : (more ? AIMED : 0.0));  // share along rays of the lamp
-    if (MORE_STEPS && doing == FIND_LIT) {
+    if (SCATTERS_ON && doing == FIND_LIT) {
       way = lamp_rays_way(rays, turn);
       from = ray_origin(rays.source, (dot(way, rays.face) < 0.0) ? -rays.face : rays.face);
     }
-    else if ((MORE_STEPS && doing == LOOK_AT_LIT) || media_random(seed) < aimed) {
+    else if ((SCATTERS_ON && doing == LOOK_AT_LIT) || media_random(seed) < aimed) {
       vec3 offset = (doing == LOOK_AT_LIT) ? lit - from : lamp_rays_draw(aiming, from, vec3(turn, media_random(seed)));
       wanted = length(offset);
       way = offset / max(wanted, 1e-30);
@@ -188,7 +184,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       continue;
     }
     ivec2 hit;
-    bool from_source = MORE_STEPS && doing == FIND_LIT;  // this ray is the shadow ray of what it finds
+    bool from_source = SCATTERS_ON && doing == FIND_LIT;  // this ray is the shadow ray of what it finds
     float limit = trace_layers(from, way, 1e29, 0.0, seed, from_source && glass_blocks != 0, from_source, hit);
     if (from_source) {
       lit_exists = hit.x >= 0;
@@ -198,9 +194,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     vec3 passed = weight * stop_sends(stop, way, lobe, seed);
     media_bins(from, way, limit, seed);
     bool in_media = bins.total > 0.0 && bins.count > 0;
-    bool at_surface = hit.x >= 0 && first_surface;
+    bool at_surface = hit.x >= 0;
     float chance = !in_media ? 0.0 : (at_surface ? clamp(1.0 - dot(bins.end, vec3(1.0 / 3.0)), 0.1, 0.9) : 1.0);
-    chance = (doing == LOOK) ? 1.0 : chance;
+    chance = (doing == LOOK) ? 1.0 : (SCATTERS_ON ? chance : 0.0);
     bool found_aim = doing != LOOK_AT_LIT && wanted > 0.0;
     bool scattered = (doing == LOOK || found_aim) ? in_media : (doing == GO_ON && media_random(seed) < chance);
     Asked asked = ask_nothing();
@@ -241,7 +237,8 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       if (doing == LOOK && number >= 0) {
         asked = ask_scattered(number, bins.media[k], position, -way, ask_turn, seed);
       }
-      else if (MORE_STEPS && doing != LOOK) {
+      else if (SCATTERS_ON && doing != LOOK) {
+        scattered_times++;
         weight = arrives;
         arrives = vec3(0.0);
         stop.inside = bins.media[k];
@@ -250,15 +247,15 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
         stop.by_unit = false;
       }
     }
-    else if (MORE_STEPS && doing != LOOK && at_surface && (doing == GO_ON || abs(limit - wanted) < 1e-3 * wanted)) {
+    else if (doing != LOOK && at_surface && (doing == GO_ON || abs(limit - wanted) < 1e-3 * wanted)) {
       vec3 normal = triangle_normal(hit);
       normal = (dot(normal, way) > 0.0) ? -normal : normal;
       position = ray_origin(position + limit * way, normal);
       vec3 bounced = passed * bins.end * mean_albedo(hit);
       // As GO_ON draws from this stop, whichever of the two has come here.
-      float by_lamp = (rays.exist && bounce + 1 < bounces) ? AIMED : 0.0;
+      float by_lamp = (SCATTERS_ON && rays.exist && bounce + 1 < bounces) ? AIMED : 0.0;
       float going = lobe * (1.0 - chance) * (1.0 - by_lamp);
-      if (number >= 0) {
+      if (SCATTERS_ON && number >= 0 && after_media) {
         asked = ask_surface(number, position, normal, ask_turn);
         float from_lamp = 0.0;
         if (rays.shadow) {
@@ -283,6 +280,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     }
     sum += arrives * rows_stood_for(number) * asked_arriving(asked, position, seed);
     if (doing == GO_ON) {
+      if (scattered_times >= scatters) {
+        break;
+      }
       stop.position = position;
       bounce++;
       // Faint walks end at random (Russian roulette).

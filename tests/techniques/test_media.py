@@ -10,6 +10,7 @@ from addon.scene.media import phase_values
 from addon.snapshot.volumes import openvdb
 from addon.ui.properties import settings_of
 from tests.techniques.foggy_stage import absorber, box, fill, fog, glowing_floor, volume
+from tests.techniques.test_image_space_subsurface import sphere
 
 trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
 
@@ -143,6 +144,22 @@ def test_a_medium_that_only_shines_lights_a_floor_as_lamps_do(stage):
     middle = seen["diffuse_direct"][6:10, 6:10, :3].mean()  # without the surface's colour, as in files
     assert middle == pytest.approx(irradiance / np.pi, rel=0.05)
     assert not seen["diffuse_indirect"][..., :3].any()
+
+
+@pytest.mark.slow
+def test_light_of_media_goes_on_from_surface_to_surface(stage):
+    """In a ball of air that shines, each reflection brings the walls their albedo of what the last one did."""
+    emission, radius, albedo, bounces = 0.3, 2.0, 0.5, 4
+    sphere(stage, stage.diffuse(albedo), radius)
+    made = volume(stage, "ShaderNodeVolumeCoefficients", Absorption_Coefficients=(0, 0, 0),
+                  Scatter_Coefficients=(0, 0, 0), Emission_Coefficients=(emission,) * 3)  # fmt: skip
+    box(stage, made, (-3, -3, -3), (3, 3, 3))
+    stage.camera((0, 0, 0), (0, 0, 0))
+    seen = stage.render(16, size=(12, 12), bounces=bounces)
+    straight = 4 / 3 * emission * radius
+    reflected = straight * sum(albedo**k for k in range(1, bounces))
+    assert seen["diffuse_direct"][..., :3].mean() == pytest.approx(straight, rel=0.03)
+    assert seen["diffuse_indirect"][..., :3].mean() == pytest.approx(reflected, rel=0.03)
 
 
 def airlight(origin, direction, far, light, intensity, scattering, extinction, steps=20001):
