@@ -351,6 +351,16 @@ def may_scatter(graph: Graph) -> bool:
     )
 
 
+def may_walk(graph: Graph) -> bool:
+    """Whether light may scatter below the surface by another method than Christensen-Burley: cheap, as the above."""
+    methods = {"ShaderNodeSubsurfaceScattering": "falloff", "ShaderNodeBsdfPrincipled": "subsurface_method"}
+    return may_scatter(graph) and any(
+        node.properties.get(methods[node.type], "RANDOM_WALK") != "BURLEY"
+        for node in graph.nodes.values()
+        if node.type in methods
+    )
+
+
 def _not_black(socket) -> bool:
     if socket is None or socket.link is not None:
         return socket is not None

@@ -419,7 +419,7 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
     )
 
 
-SCATTER_IMAGES = ("length", "share", "entry")  # layout: shaders/subsurface/image.glsl
+SCATTER_IMAGES = ("length", "share", "entry", "walk")  # layout: shaders/subsurface/image.glsl
 
 
 @_once

@@ -31,13 +31,16 @@ import numpy as np
 
 from ..gfx import images
 from ..materials import translucency
+from ..materials.compiler import may_walk
 from ..materials.translucency import maps_of
 from ..materials.working_space import current
 from ..snapshot.scene import Instance, Snapshot
 from .pieces import octahedral
 from .scatter_surface import ROW, RUNS, Surface, Voxels
 
-FEWEST = 64  # cells of an object
+FEWEST, FEWEST_WALKED = 256, 1024  # cells of an object
+WALKED = 0.25  # of the distance between points: where walks look light up, it is not spread by a profile beside
+RANGE = 2.5  # distances between points: where pixels stop and points begin
 SPACING = 0.7  # of the longest scale of the profile, or the mean thickness: how far apart points are wished
 
 
@@ -65,8 +68,9 @@ class ScatterPoints:
         self._normals: list[images.Image] = []
         self._entries: list[images.Image] = []  # by run: painted tint and translucency
         self._instances: images.Image | None = None
-        self.cells: list[images.Image] = []  # by run: place, w = area of the cell, m2
-        self.bounds: images.Image | None = None  # by row: centre and radius
+        self.curves: images.Image | None = None  # radius of curvature, m
+        # By run: place, w = area of the cell, m2; after the cells of a row its bounding sphere.
+        self.cells: list[images.Image] = []
         # By row of instances: 1 + number of the object in front, or 0, and of that behind; then the objects.
         self.table: images.Image | None = None
         self.near: images.Image | None = None  # voxels: 1 + number of the cell that faces +x, -x, +y; -y, +z, -z
@@ -75,7 +79,8 @@ class ScatterPoints:
         """Make points anew if surfaces moved or scatter otherwise; True if so. At most `most` cells in all."""
         snapshot, materials = frame.snapshot, frame.materials.compiled
         placed = frame.geometry.placed[0]  # shaders look objects up by rows of the geometry's image
-        reach = tuple(m.scatter for m in materials)
+        walked = tuple(may_walk(material.graph) for material in snapshot.materials)
+        reach = tuple(m.scatter * (WALKED if by_walks else 1.0) for m, by_walks in zip(materials, walked))
         shown = [k for k, instance in enumerate(placed) if any(reach[m] > 0.0 for m in instance.materials)]
         maps = [maps_of(material.graph) for material in snapshot.materials]
         painted = [(k, *one, snapshot.images[one[1]].version) for k, found in enumerate(maps) for one in found.items()]
@@ -88,7 +93,7 @@ class ScatterPoints:
         if key == self._key:
             return False
         self._key = key
-        self._make(snapshot, placed, shown, reach, maps, frame.geometry.origin, most)
+        self._make(snapshot, placed, shown, (reach, walked), maps, frame.geometry.origin, most)
         return True
 
     def entries(self, run: int) -> images.Image:
@@ -110,13 +115,16 @@ class ScatterPoints:
         return self._instances
 
     def _make(
-        self, snapshot: Snapshot, placed: list[Instance], shown: list[int], reach: tuple, maps: list,
+        self, snapshot: Snapshot, placed: list[Instance], shown: list[int], scatters: tuple, maps: list,
         origin: np.ndarray, most: int,
     ) -> None:  # fmt: skip
-        sides = []
+        sides, fewest = [], []
+        reach, walked = scatters
         for k in shown:
             sides += [(k, one) for one in Surface.sides(placed[k], snapshot.meshes[placed[k].mesh], reach, origin)]
-        counts = _counts([one for _, one in sides], most)
+            by_walks = any(walked[m] and reach[m] > 0.0 for m in placed[k].materials)
+            fewest += [FEWEST_WALKED if by_walks else FEWEST] * (len(sides) - len(fewest))
+        counts = _counts([one for _, one in sides], np.array(fewest), most)
         self.objects, blocks, row = [], [], 0
         table = np.zeros((max(len(placed), 1), 4), np.float32)
         clouds: dict[int, list] = {}
@@ -147,43 +155,48 @@ class ScatterPoints:
         self._upload(blocks)
 
     def _upload(self, blocks: list) -> None:
-        self._positions, self._normals, self._entries, self.cells, self.bounds = [], [], [], [], None
+        self._positions, self._normals, self._entries, self.cells = [], [], [], []
         self._instances = None
         if not blocks:
             return
-        place, normal, face, area, entry = (np.concatenate(parts) for parts in zip(*blocks))
+        place, normal, face, area, curve, entry = (np.concatenate(parts) for parts in zip(*blocks))
         rows = len(place) // ROW
         by_row = place.reshape(rows, ROW * RUNS, 3)
         low, high = by_row.min(axis=1), by_row.max(axis=1)
         centre = (low + high) / 2
         radius = np.linalg.norm(by_row - centre[:, None], axis=2).max(axis=1)
         bounds = np.concatenate([centre, 1.0001 * radius[:, None]], axis=1)
-        self.bounds = images.upload(bounds.astype(np.float32).reshape(rows, 1, 4))
         one = np.ones((len(place), 1))
+        self.curves = _image(np.repeat(curve[:, None], 4, axis=1))
         for run in range(RUNS):
             self._positions.append(_image(np.concatenate([place[:, run], one], axis=1)))
             packed = np.concatenate([octahedral(normal[:, run]), octahedral(face[:, run])], axis=1)
             self._normals.append(_image(packed))
             self._entries.append(_image(entry[:, run]))
-            self.cells.append(_image(np.concatenate([place[:, run], area[:, None]], axis=1)))
+            cells = np.concatenate([place[:, run], area[:, None]], axis=1).reshape(rows, ROW, 4)
+            self.cells.append(images.upload(np.concatenate([cells, bounds[:, None]], axis=1).astype(np.float32)))
 
     def release(self) -> None:
         self.__init__()
 
 
-def _counts(surfaces: list[Surface], most: int) -> np.ndarray:
+def _counts(surfaces: list[Surface], fewest: np.ndarray, most: int) -> np.ndarray:
     """Cells of each object, whole rows, at most `most` in all."""
     wished = np.array([one.area / max(SPACING * min(one.reach, one.thickness), 1e-30) ** 2 for one in surfaces])
-    wished = np.maximum(np.nan_to_num(wished, posinf=1e12), FEWEST)
-    wished = np.maximum(wished * np.array([one.share for one in surfaces]), ROW)
-    if wished.sum() > most:
+    wished = np.maximum(np.nan_to_num(wished, posinf=1e12), fewest)
+    shares = np.array([one.share for one in surfaces])
+    if (wished * shares).sum() > most:
         # What is left of a few large wishes goes to those.
-        fair = np.sort(wished)
-        before = np.concatenate([[0.0], np.cumsum(fair)[:-1]])
-        caps = (most - before) / np.arange(len(fair), 0, -1)
+        order = np.argsort(wished)
+        fair, part = wished[order], shares[order]
+        before = np.concatenate([[0.0], np.cumsum(fair * part)[:-1]])
+        caps = (most - before) / np.cumsum(part[::-1])[::-1]
         fits = np.flatnonzero(caps <= fair)
         wished = np.minimum(wished, max(caps[fits[0]], 1.0) if len(fits) else wished)
+    wished = np.maximum(wished * shares, 1.0)
     counts = np.maximum(np.ceil(wished / ROW).astype(int) * ROW, ROW)
+    if counts.sum() > most:
+        counts = np.maximum(np.floor(wished / ROW).astype(int) * ROW, ROW)
     if counts.sum() > most:  # a row each is too much: what comes first has one
         counts[np.cumsum(counts) > most] = 0
     return counts

@@ -16,6 +16,7 @@ ROW = 64  # cells
 RUNS = 8  # points of the cloud for each cell
 TURN = 0.7  # cell sizes by which two opposite faces count as apart
 FEWEST_BEHIND = 0.125  # of an object's points, on the other side of a part that is nearly closed
+NEARLY = 0.1  # of a part's surface: a disc with the rim of its holes, up to which it counts as a body
 MOST_VOXELS = 64  # along an axis
 VOXEL = 0.75  # of the distance between points
 AXES = np.concatenate([[axis, -axis] for axis in np.eye(3)])
@@ -74,8 +75,12 @@ class Surface:
         layer = mesh.uv_maps.get(mesh.active_uv)
         shown = mesh.triangle_corners[kept]
         uv = np.zeros((len(shown), 3, 2)) if layer is None else layer[shown].astype(np.float64)
-        solid = float(by_part[parts.closed].sum())
-        thickness = 4.0 * float(np.abs(volumes[parts.closed]).sum()) / solid if solid > 0.0 else np.inf
+        # Of a part that is nearly closed its other side is hardly ever seen.
+        scale = abs(np.linalg.det(linear)) ** (1.0 / 3.0)
+        gaps = (scale * parts.rim) ** 2 / np.maximum(4.0 * np.pi * by_part, 1e-30)
+        bodies = gaps < NEARLY
+        solid = float(by_part[bodies].sum())
+        thickness = 4.0 * float(np.abs(volumes[bodies]).sum()) / solid if solid > 0.0 else np.inf
         front = cls(
             all_corners[kept], normals[kept], areas[kept], uv, material[kept],
             float(positive.min()) if len(positive) else 0.0, thickness if thickness > 0.0 else np.inf,
@@ -83,16 +88,14 @@ class Surface:
         open_parts = ~closed[kept]
         if not open_parts.any():
             return [front]
-        # Of a part that is nearly closed its other side is hardly ever seen.
-        scale = abs(np.linalg.det(linear)) ** (1.0 / 3.0)
-        opened = ~parts.closed
-        gap = float((scale * parts.rim[opened]).sum()) ** 2 / max(4.0 * np.pi * float(by_part[opened].sum()), 1e-30)
-        share = float(np.clip(4.0 * gap, FEWEST_BEHIND, 1.0))
+        gap = np.average(gaps, weights=np.where(parts.closed, 0.0, by_part) + 1e-30)
+        share = float(np.clip(gap / NEARLY, FEWEST_BEHIND, 1.0))
         turned = np.where(open_parts[:, None, None], -front.normals, front.normals)
         return [front, replace(front, normals=turned, share=share, behind=True)]
 
     def cells(self, count: int) -> tuple[np.ndarray, ...]:
-        """Points (count, RUNS, 3), shading normals and triangles' normals of the same shape, areas (count,), numbers of
+        """Points (count, RUNS, 3), shading normals and triangles' normals of the same shape, areas and radii of
+        curvature (count,), by how much normals differ in a cell for how much places do; numbers of
         triangles (count, RUNS), texture coordinates (count, RUNS, 2), and the cloud: places, triangles' normals and the
         cell of each."""
         place, normal, face, triangle, uv = self._cloud(count * RUNS)
@@ -109,7 +112,9 @@ class Surface:
         member, sums = member[along], sums[along]
         areas = sums * (self.area / len(place))
         cell = np.argsort(along, kind="stable")[owner]
-        return place[member], normal[member], face[member], areas, triangle[member], uv[member], (place, face, cell)
+        radius = np.sqrt(_spreads(place, cell, count) / np.maximum(_spreads(face, cell, count), 1e-9))
+        found = place[member], normal[member], face[member], areas, radius
+        return *found, triangle[member], uv[member], (place, face, cell)
 
     def _cloud(self, count: int) -> tuple[np.ndarray, ...]:
         """Evenly spread points, with shading normals, those of their triangles, the triangles' numbers and texture
@@ -148,17 +153,24 @@ class Voxels:
         low = low - size
         shape = tuple((np.floor((high - low) / size).astype(int) + 2).tolist())
         found = np.zeros((6, *shape), np.int64)
-        for place, face, cell, first, _ in clouds:
-            at = (place - low) / size
-            voxel = np.floor(at).astype(int)
-            off = np.linalg.norm(at - voxel - 0.5, axis=1)
-            for axis, direction in enumerate(AXES):
-                along = face @ direction
-                best = np.argsort(along - 0.3 * off, kind="stable")
-                best = best[along[best] > 0.3]  # the last one written stays
-                found[axis][tuple(voxel[best].T)] = 1 + first + cell[best]
-        for _ in range(2):
-            found = _spread(found)
+        # What faces along the axis more than along others comes first, then what does at all; in either, the front of
+        # thin parts before the inside of the face across.
+        for mostly in (True, False):
+            for place, face, cell, first, _ in clouds:
+                own = np.zeros_like(found)
+                at = (place - low) / size
+                voxel = np.floor(at).astype(int)
+                off = np.linalg.norm(at - voxel - 0.5, axis=1)
+                along = face @ AXES.T
+                most = along.argmax(axis=1)
+                for axis in range(6):
+                    of_axis = (most == axis) if mostly else (along[:, axis] > 0.3)
+                    best = np.argsort(-off, kind="stable")
+                    best = best[of_axis[best]]  # the last one written stays
+                    own[axis][tuple(voxel[best].T)] = 1 + first + cell[best]
+                for _ in range(2):
+                    own = _spread(own)
+                found = np.where(found == 0, own, found)
         packed = np.moveaxis(found, 0, -1).reshape(-1, 2, 3)
         texels = np.concatenate([packed, np.zeros((len(packed), 2, 1))], axis=2).reshape(-1, 4)
         return cls(low, size, shape, texels.astype(np.float32))
@@ -175,6 +187,13 @@ def _spread(found: np.ndarray) -> np.ndarray:
             beside = out[tuple(into)]
             out[tuple(into)] = np.where(beside == 0, found[tuple(of)], beside)
     return out
+
+
+def _spreads(values: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
+    """(count,) mean squared distance of the values (N, 3) of each owner from their mean."""
+    each = np.maximum(np.bincount(owner, minlength=count), 1)
+    mean = np.stack([np.bincount(owner, weights=axis, minlength=count) for axis in values.T], axis=1) / each[:, None]
+    return np.bincount(owner, weights=((values - mean[owner]) ** 2).sum(axis=1), minlength=count) / each
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

@@ -448,6 +448,11 @@ class Hits:
             self._possible = (key, shown)
         return self._possible[1]
 
+    def owners(self, frame: Frame, hierarchy: Hierarchy) -> tuple[images.Image, int]:
+        """For shaders that ask which instance a triangle is of: the image of `owners`, and the leaf that it begins
+        with."""
+        return self._owners_of(frame, hierarchy), hierarchy.first_leaf - _leaves_of_rows(hierarchy)
+
     # What stands behind triangles -----------------------------------------------------------------------------------
 
     def _owners_of(self, frame: Frame, hierarchy: Hierarchy) -> images.Image:

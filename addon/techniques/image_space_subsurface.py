@@ -40,20 +40,19 @@ from ..frame.technique import MATERIAL, Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import diffusion
-from ..lighting import repeated_light
+from ..lighting import repeated_light, walked_light
 from ..lighting.point_light import LIGHTING, PointLight
 from ..lighting.visibility import RAYS, ray_bindings
 from ..materials import translucency
 from ..materials.compiler import may_scatter
 from ..scene import acceleration
 from ..scene.materials import SCATTER_IMAGES
-from ..scene.scatter_points import ROW, ScatterPoints
+from ..scene.scatter_points import RANGE, ROW, ScatterPoints
 from ..scene.view import VIEW
 from ..snapshot.scene import Note, Snapshot
 from ..surfaces.draw import SURFACES, draw_scatter
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
 
-RANGE = 2.5  # distances between points: where pixels stop and points begin
 RAYS_INDIRECT = 4  # of a point in a sample
 IMAGES = tuple(f"surface.scatter_{name}" for name in SCATTER_IMAGES)
 
@@ -69,19 +68,21 @@ GATHER = passes.fullscreen_program(
     textures=tuple(
         ("RGBA32F", name)
         for name in (
-            "cells", "cell_direct", "cell_indirect", *PICTURE, "cell_bounds", "scatter_objects", "walk_lobes",
+            "cells", "cell_direct", "cell_indirect", *PICTURE, "walked_near", "scatter_objects", "walk_lobes",
             "whole_before", "cell_shapes",
         )
     ),
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "first_object"), ("INT", "taps"), ("INT", "points_lit")),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
-    outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect"), ("VEC4", "out_whole")),
+    outputs=tuple(("VEC4", f"out_{name}") for name in ("direct", "indirect", "whole", "near_direct", "near_indirect")),
 )  # fmt: skip
+LEFT = ("left_direct", "left_indirect", "near_direct", "near_indirect")
+WALKED = tuple(f"walked_{name}" for name in walked_light.NAMES)
 APPLY = passes.fullscreen_program(
     "subsurface apply",
     "subsurface/apply.frag.glsl",
-    textures=(("RGBA32F", "scatter_share"), ("RGBA32F", "left_direct"), ("RGBA32F", "left_indirect")),
+    textures=tuple(("RGBA32F", name) for name in ("surface_diffuse", "scatter_share", *LEFT, *WALKED)),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
 )
 INDIRECT = passes.fullscreen_program(
@@ -95,7 +96,7 @@ INDIRECT = passes.fullscreen_program(
 CHORD = passes.fullscreen_program(
     "subsurface chord",
     "subsurface/chord.frag.glsl",
-    textures=(*RAYS.textures, *POINT_TEXTURES),
+    textures=(*RAYS.textures, *POINT_TEXTURES, ("RGBA32F", "point_curve")),
     blocks=((VIEW, "film_view"),),
     constants=(*RAYS.constants, ("FLOAT", "longest")),
     outputs=(("VEC4", "out_shape"),),
@@ -143,6 +144,7 @@ class ImageSpaceSubsurface(Technique):
         Write(IMAGES[0], "RGBA32F", "How far light spreads below the surface, m; the albedo that says how"),
         Write(IMAGES[1], "RGBA32F", "Share of the diffuse albedo that does; the object"),
         Write(IMAGES[2], "RGBA32F", "Painted: tint of the light that enters; how translucent the surface is"),
+        Write(IMAGES[3], "RGBA32F", "Interface that the view's ray enters by: roughness squared, index of refraction"),
         *(Write(name, "RGBA32F", "What left the surface takes the place of what entered", True) for name in LIGHT),
     )
 
@@ -152,7 +154,7 @@ class ImageSpaceSubsurface(Technique):
         self._lobes: images.Image | None = None
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
-        self._shapes: images.Image | None = None  # of cells: normal and mean length of lines through the object
+        self._shapes: images.Image | None = None  # of cells: normal, depth, mean length of lines through
         self._met: tuple[int, int] | None = None  # what the rays of these have met
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -162,7 +164,7 @@ class ImageSpaceSubsurface(Technique):
         return acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return GATHER, APPLY, CHORD, LIGHTING
+        return GATHER, APPLY, CHORD, LIGHTING, *walked_light.PROGRAMS
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._materials or frame.receivers is None or not len(frame.receivers.distance):
@@ -213,6 +215,7 @@ class ImageSpaceSubsurface(Technique):
             CHORD, images.Target((self._shapes,)),
             textures={
                 **textures, "point_position": position, "point_normal": normal, "point_entry": self.points.entries(0),
+                "point_curve": self.points.curves,
             },
             blocks={"film_view": frame.view_block}, constants={**constants, "longest": 2.0 * frame.geometry.size},
         )  # fmt: skip
@@ -272,11 +275,13 @@ class ImageSpaceSubsurface(Technique):
     def _gather(self, frame: Frame, lit: tuple[images.Image, images.Image] | None) -> Iterator[None]:
         shown = frame.images
         nothing = self._constant_images((1, 1))[1] if lit is None else None
+        walked = self._walk(frame, lit)
+        yield
         points = {
             "cells": self.points.cells[frame.sample % len(self.points.cells)] if lit else nothing,
             "cell_direct": lit[0] if lit else nothing,
             "cell_indirect": lit[1] if lit else nothing,
-            "cell_bounds": self.points.bounds if lit else nothing,
+            "walked_near": walked[-1],
             "cell_shapes": self._shapes if lit else nothing,
             "scatter_objects": self.points.table,
             "walk_lobes": self._lobes,
@@ -285,9 +290,9 @@ class ImageSpaceSubsurface(Technique):
             shown["surface.position"], shown["surface.normal"], shown["surface.diffuse"], shown[IMAGES[0]],
             shown[IMAGES[1]], shown[IMAGES[2]], shown[LIGHT[0]], shown[LIGHT[1]],
         )  # fmt: skip
-        left = [images.pool.take(*frame.size, "RGBA32F") for _ in LIGHT]
+        left = [images.pool.take(*frame.size, "RGBA32F") for _ in LEFT]
         before, after = self._whole
-        target = images.Target((*left, after.colors[0]))
+        target = images.Target((*left[:2], after.colors[0], *left[2:]))
         for rows in frame.bands(self):
             passes.fullscreen(
                 GATHER, target, rows=rows,
@@ -301,12 +306,24 @@ class ImageSpaceSubsurface(Technique):
             yield
         passes.fullscreen(
             APPLY, frame.target(*LIGHT),
-            textures={"scatter_share": shown[IMAGES[1]], "left_direct": left[0], "left_indirect": left[1]},
+            textures={
+                "surface_diffuse": shown["surface.diffuse"], "scatter_share": shown[IMAGES[1]],
+                **dict(zip(LEFT, left)), **dict(zip(WALKED, walked)),
+            },
         )  # fmt: skip
-        for image in left:
+        for image in (*left, *walked):
             images.pool.give(image)
         self._whole = [after, before]
         frame.count(self, "passes", 2)
+
+    def _walk(self, frame: Frame, lit: tuple[images.Image, images.Image] | None) -> list[images.Image]:
+        if lit is None:
+            made = [images.pool.take(1, 1, "RGBA32F") for _ in WALKED]
+            images.Target(tuple(made)).clear()
+            return made
+        found = {"cell_direct": lit[0], "cell_indirect": lit[1], "cell_shapes": self._shapes}
+        frame.count(self, "passes")
+        return walked_light.walk(frame, self.points, found, self._lobes, frame.size)
 
     def _give_shapes(self) -> None:
         if self._shapes is not None:

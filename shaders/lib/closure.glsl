@@ -112,6 +112,8 @@ struct Closures {
   float scatter_most;     // albedo of the one that the next two are of
   int scatter_method;     // SCATTER_*
   float scatter_entry;    // cosine at which the view's ray enters
+  float scatter_alpha;    // roughness of the interface there, squared, and its index of refraction
+  float scatter_ior;
   float map_length;       // painted: factor of the length
   vec4 map_entry;         // painted: tint of light that enters, and how much of it scatters
 #endif
@@ -160,6 +162,8 @@ Closures closures_begin(vec3 normal, float random_number, float even_share)
   c.scatter_most = 0.0;
   c.scatter_method = SCATTER_BURLEY;
   c.scatter_entry = 1.0;
+  c.scatter_alpha = 1.0;
+  c.scatter_ior = 1.0;
   c.map_length = 1.0;
   c.map_entry = vec4(1.0);
 #endif

@@ -65,6 +65,9 @@ void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, 
   if (added > c.scatter_most) {
     c.scatter_most = added;
     c.scatter_method = (method == METHOD_LEGACY) ? SCATTER_WALK : method;
-    c.scatter_entry = entry_cosine(cosine, index, (method == METHOD_SKIN) ? 1.0 : clamp(roughness, 0.0, 1.0));
+    float rough = (method == METHOD_SKIN) ? 1.0 : clamp(roughness, 0.0, 1.0);
+    c.scatter_entry = entry_cosine(cosine, index, rough);
+    c.scatter_alpha = rough * rough;
+    c.scatter_ior = index;
   }
 }

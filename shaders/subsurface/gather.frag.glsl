@@ -2,11 +2,13 @@
 //
 //   E(x) = c_near mean of E over pixels within the window + (1 - c_near) mean of E over points of the mesh beyond it,
 //
-// each by the profile, per channel. `light_*` hold the radiance of the picture's pixels, albedo included; points are white.
+// each by the profile, per channel. Where walks take the place of this (walk.frag.glsl), the mean over pixels is an image of
+// its own. `light_*` hold the radiance of the picture's pixels, albedo included; points are white.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "subsurface/image.glsl"
 #include "subsurface/profile.glsl"
+#include "subsurface/walked.glsl"
 
 #define LEAST_COLOR 1e-5  // what is darker tells nothing of the light that arrives
 #define GOLDEN 2.39996323
@@ -28,26 +30,6 @@ void arriving_pixel(inout Arriving sum, ivec2 pixel, float translucency, vec3 we
   sum.direct += per * light_direct_fetch(pixel).rgb;
   sum.indirect += per * light_indirect_fetch(pixel).rgb;
   sum.whole += known;
-}
-
-bool pixel_seen(vec3 place, out ivec2 pixel)
-{
-  vec4 p = vec4(place, 1.0);
-  float w = dot(film_view.row_w, p);
-  pixel = ivec2(0);
-  if (w <= 0.0) {
-    return false;
-  }
-  ivec2 size = surface_position_size();
-  pixel = ivec2(floor((vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * vec2(size)));
-  return all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, size));
-}
-
-float pixel_width_at(vec3 position)
-{
-  float w = dot(film_view.row_w, vec4(position, 1.0));
-  float across = (film_view.frame.y - film_view.frame.x) / film_view.film.x;
-  return (film_view.eye.w > 0.5) ? across : across * w;
 }
 
 // Mean of what arrives at pixels of the object within `extent`, by the profile in the window; taps on a spiral, denser inwards.
@@ -145,7 +127,7 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
   int first = int(object.x + 0.5);
   int last = first + int(object.y + 0.5);
   for (int row = first; row < last; row++) {
-    vec4 bound = cell_bounds_fetch(ivec2(0, row));
+    vec4 bound = cells_fetch(ivec2(ROW, row));
     if (distance(bound.xyz, position) - bound.w > max(reach, 2.0 * object.z)) {
       continue;
     }
@@ -155,7 +137,7 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
       float r = distance(cell.xyz, position);
       if (r < max(reach, 2.0 * object.z)) {
         vec4 shape = cell_shapes_fetch(texel);
-        vec3 face = octahedral_decode(shape.xy);
+        vec3 face = unpack_normal(shape.x);
         float facing = dot(face, normal);
         float front = smoothstep(-0.2, 0.4, facing);
         float nearness = front / (r * r + object.z * object.z);
@@ -199,6 +181,8 @@ void main()
   out_direct = light_direct_fetch(pixel);
   out_indirect = light_indirect_fetch(pixel);
   out_whole = whole_before_fetch(pixel);
+  out_near_direct = vec4(0.0);
+  out_near_indirect = vec4(0.0);
   vec4 share = scatter_share_fetch(pixel);
   if (share.w < 4.0) {
     return;
@@ -223,20 +207,25 @@ void main()
   vec3 direct = own.direct;
   vec3 indirect = own.indirect;
   float code = floor(share.w * 0.25);
-  int place = first_object + OBJECT_TEXELS * (int(code) - 1);
-  vec4 object = scatter_objects_fetch(ivec2(place & 2047, place >> 11));
+  vec4 object = object_texel(first_object + OBJECT_TEXELS * (int(code) - 1));
   float reach = profile_reach(profile);
+  vec3 stays = vec3(1.0) - share.rgb * translucency;
+  vec3 leaves = albedo * share.rgb;
+  float walked = (points_lit != 0) ? walked_near_fetch(pixel).w : 0.0;
   if (reach > width) {  // else all of it lies within the pixel
     // Without points, or where they lie too far apart to know more than pixels do, all is taken from these.
-    bool has_points = reach > max(RANGE * object.z, 2.0 * width) && object.y > 0.5 && points_lit != 0;
-    float range = has_points ? RANGE * object.z : 1e3 * reach;
+    bool has_points = points_tell(reach, object, width, points_lit != 0);
+    float window = (kind == PROFILE_WALK) ? window_of_walks(object, width) : RANGE * object.z;
+    float range = has_points ? window : 1e3 * reach;
     vec3 beyond;
     Arriving near =
         near_light(pixel, position, normal, profile, code, min(range, reach), range, width, translucency, beyond);
     vec3 found = step(vec3(1e-20), near.whole);
     direct = mix(own.direct, near.direct / max(near.whole, vec3(1e-20)), found);
     indirect = mix(own.indirect, near.indirect / max(near.whole, vec3(1e-20)), found);
-    if (has_points) {
+    out_near_direct = vec4(walked * leaves * direct, walked);
+    out_near_indirect = vec4(walked * leaves * indirect, walked);
+    if (has_points && walked < 1.0) {
       vec3 inside = profile_near(profile, range);
       vec3 outside = max(vec3(1.0) - inside, vec3(0.0));
       Far far = far_light(position, normal, profile, object, range, kind, free_path, absorption, translucency);
@@ -267,7 +256,6 @@ void main()
     direct *= factor;
     indirect *= factor;
   }
-  vec3 stays = vec3(1.0) - share.rgb * translucency;
-  out_direct.rgb = out_direct.rgb * stays + albedo * share.rgb * direct;
-  out_indirect.rgb = out_indirect.rgb * stays + albedo * share.rgb * indirect;
+  out_direct.rgb = out_direct.rgb * stays + (1.0 - walked) * leaves * direct;
+  out_indirect.rgb = out_indirect.rgb * stays + (1.0 - walked) * leaves * indirect;
 }

@@ -1,9 +1,10 @@
-// How a pixel's light below the surface is laid out in three images, written by surface/scatter.frag.glsl:
+// How a pixel's light below the surface is laid out in four images, written by surface/scatter.frag.glsl:
 //
 //   length  length of the profile per channel, m (Burley's d, or the walk's mean free path); w: albedo that decides the
 //           profile's shape, 8 bits a channel
 //   share   part of the diffuse albedo per channel whose light enters elsewhere; w: 0 none, else the object's number from 1
 //           on times 4, the method (SCATTER_*), and as a fraction the cosine at which the view's ray enters
+//   walk    of the interface that the view's ray enters by: roughness squared, index of refraction
 //   entry   painted: tint of the light that enters here; w: how translucent the surface is here
 #include "lib/math.glsl"
 

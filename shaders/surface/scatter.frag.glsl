@@ -38,5 +38,6 @@ void main()
   out_length = vec4(c.scatter_length / weight * c.map_length, pack_albedo(c.scatter_color / weight));
   out_share = vec4(clamp(part, vec3(0.0), vec3(1.0)), scatter_code(object, c.scatter_method, c.scatter_entry));
   bool finite = is_finite(c.map_entry.x + c.map_entry.y + c.map_entry.z + c.map_entry.w);
+  out_walk = vec4(c.scatter_alpha, c.scatter_ior, 0.0, 0.0);
   out_entry = finite ? c.map_entry : vec4(1.0);
 }

@@ -1,0 +1,55 @@
+// Which part of a pixel's light below its surface random walks find, and where places lie in the picture. A program that includes
+// this binds `film_view`, `scatter_objects` and `surface_position`.
+
+#define DEEP 4.0
+#define DEEPER 12.0
+
+vec4 object_texel(int index)
+{
+  return scatter_objects_fetch(ivec2(index & 2047, index >> 11));
+}
+
+float pixel_width_at(vec3 position)
+{
+  float w = dot(film_view.row_w, vec4(position, 1.0));
+  float across = (film_view.frame.y - film_view.frame.x) / film_view.film.x;
+  return (film_view.eye.w > 0.5) ? across : across * w;
+}
+
+bool pixel_seen(vec3 place, out ivec2 pixel)
+{
+  vec4 p = vec4(place, 1.0);
+  float w = dot(film_view.row_w, p);
+  pixel = ivec2(0);
+  if (w <= 0.0) {
+    return false;
+  }
+  ivec2 size = surface_position_size();
+  pixel = ivec2(floor((vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * vec2(size)));
+  return all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, size));
+}
+
+// Whether points of the object know more of the light than pixels do.
+bool points_tell(float reach, vec4 object, float width, bool lit)
+{
+  return reach > max(RANGE * object.z, 2.0 * width) && object.y > 0.5 && lit;
+}
+
+// Up to where pixels tell the light that walks leave by, m: few pixels' widths at least, in which no cell is known better.
+float window_of_walks(vec4 object, float width)
+{
+  return max(RANGE * object.z, 3.0 * width);
+}
+
+// All of it where the object is less deep than DEEP times the mean distance at which light leaves, none where it is DEEPER: there
+// a plane's profile errs by less than walks do (docs/subsurface.md). None either where little of the profile, at most a
+// hundredth, lies beyond the window of pixels and the object.
+float walked_part(Profile profile, vec4 object, float width, float depth)
+{
+  if (!points_tell(profile_reach(profile), object, width, true)) {
+    return 0.0;
+  }
+  vec3 away = profile.share1 * profile.scale1 + profile.share2 * profile.scale2 + profile.share3 * profile.scale3;
+  float beyond = smoothstep(0.0, 0.01, max_component(vec3(1.0) - profile_near(profile, min(window_of_walks(object, width), depth))));
+  return beyond * (1.0 - smoothstep(DEEP, DEEPER, depth / max_component(away)));
+}
