@@ -367,3 +367,46 @@ def test_relief_over_wax_is_named(stage):
     stage.camera_above(1.0)
     stage.render(1, (8, 8))
     assert any(note.material == wax.name and "below its relief" in note.text for note in stage.ledger.notes)
+
+
+def walked_through(paths, albedo, walks=200_000):
+    """Shares of walks, straight into a slab of so many free paths, that leave it in front and behind: a plain walk."""
+    random = np.random.default_rng(1)
+    z, along, alive = np.zeros(walks), np.ones(walks), np.ones(walks, bool)
+    left = np.zeros(2)
+    while alive.any():
+        z = z + along * -np.log(random.random(walks))
+        out = alive & ((z < 0.0) | (z > paths))
+        left += (out & (z < 0.0)).sum(), (out & (z > paths)).sum()
+        alive &= ~out & (random.random(walks) < albedo)
+        along = random.uniform(-1.0, 1.0, walks)
+    return left / walks
+
+
+@pytest.mark.parametrize("paths", [0.5, 3.0])
+@pytest.mark.parametrize("behind", [True, False])
+def test_walks_through_a_slab_are_plain_walks(stage, paths, behind):
+    material = scattering(stage, "RANDOM_WALK", 0.1, color=(0.8, 0.8, 0.8))
+    material.node_tree.nodes[0].inputs["Roughness"].default_value = 0.0
+    stage.rectangle((-3, -3), (3, 3), material=material)
+    stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1 * paths
+    stage.light("SUN", turn=(np.pi if behind else 0.0, 0, 0), energy=np.pi, angle=0.0)
+    stage.camera_above(0.5)
+    albedo = 1.0 - (4.20863 * 0.8 + 4.09712 - np.sqrt(9.59217 + 41.6808 * 0.8 + 17.7126 * 0.64)) ** 2
+    expected = walked_through(paths, albedo)[int(behind)]
+    assert shown(stage.render(4, size=(24, 24))).mean() == pytest.approx(expected, rel=0.03)
+
+
+def test_walks_in_a_white_body_under_an_even_world_lose_nothing(stage):
+    sphere(stage, scattering(stage, "RANDOM_WALK", 0.3, color=(1, 1, 1)), radius=1.0)
+    stage.world((1, 1, 1))
+    stage.camera_above(0.5, 5.0)
+    assert shown(stage.render(4, size=(24, 24))).mean() == pytest.approx(1.0, abs=0.03)
+
+
+def test_walks_light_a_ball_from_behind_as_in_cycles(stage):
+    sphere(stage, scattering(stage, "RANDOM_WALK", 0.4, radius=(1, 0.6, 0.3)), radius=1.0)
+    stage.light("SUN", turn=(2.4, 0, 0), energy=np.pi, angle=0.1)
+    stage.camera_above(0.9, 5.0)
+    cycles = shown(stage.render(128, size=(24, 24), engine="CYCLES")).mean(axis=(0, 1))
+    assert shown(stage.render(16, size=(24, 24))).mean(axis=(0, 1)) == pytest.approx(cycles, rel=0.05, abs=2e-4)
