@@ -217,6 +217,12 @@ class Frame:
         return frozenset(one.links.passing for one in (*snapshot.lights, *snapshot.instances) if one.links.passing)
 
     @cached_property
+    def lights_are_linked(self) -> bool:
+        """Whether a light leaves out receivers, or some objects do not block it."""
+        givers = (*self.snapshot.lights, *self.snapshot.instances)
+        return any(one.links.unlit or one.links.passing for one in givers)
+
+    @cached_property
     def measured_materials(self) -> list[CompiledMaterial]:
         """The scene's materials, with the means that they have on the surfaces that show them."""
         return self.surface_means.of(self.materials, self.geometry)

@@ -84,15 +84,18 @@ class EmissiveTriangles:
         self._edges = np.concatenate([[0.0], np.cumsum(weight)])
 
     def row(
-        self, numbers: tuple[float, float, float], share: float, flags: int, views: int = 1, samples: float = np.inf
-    ) -> np.ndarray:
+        self, numbers: tuple[float, float, float], share: float, flags: int, views: int = 1, samples: float = np.inf,
+        at_hits: bool = False,
+    ) -> np.ndarray:  # fmt: skip
         """Of a point drawn by three uniform numbers, one of `share` in each of `samples` samples; see lights.py. Flags
-        of the paths that see it are added."""
+        of the paths that see it are added. `at_hits`: of the row of a light for traced paths."""
         k, point, density = self.draw(*numbers)
         flags += int(self.flags[k]) + lights.SIDED_FLAG * bool(self.sided[k])
         normal, radiance = self.normal[k], self.radiance[k]
         row = lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
         row[0, 0] += self.unlit[k]
+        if at_hits:
+            row[0, 2] = lights.passing_bits(self.passing[k])
         return row
 
     def draw(self, x: float, y: float, z: float) -> tuple[int, np.ndarray, float]:

@@ -10,12 +10,16 @@ without links compile and draw nothing of this.
 | passes | 1 of surfaces and 1 of groups, and a fetch more per pixel in each linked pass |
 | memory | 7 images of 16 bytes a pixel while it draws, 1 of 4 that stays |
 
-Not followed: light that reaches a surface by way of others, through glass, or in a volume; emissive meshes in mirrors.
+Light that rays find at other surfaces (shaders/indirect/path.glsl) follows links, too: triangles of the hierarchy know
+the groups of their object. Not followed: light of other kinds of bounces, through glass, or in a volume; emissive
+meshes in mirrors.
 """
 
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -60,6 +64,17 @@ def linked(
 def find_groups(frame: Frame, numbers: images.Image, groups: images.Target) -> None:
     """From the numbers of instances (z: rows of the geometry's image) their groups of receivers."""
     passes.fullscreen(FIND_GROUPS, groups, textures={"surface_object": numbers, "instances": frame.geometry.instances})
+
+
+def linked_at_hits(frame: Frame, program: Program) -> Program:
+    """The same pass of shaders/indirect/path.glsl, for the links that the frame's lights have: what rays meet is lit by
+    those that light it, through what does not block them."""
+    return _linked_at_hits(program) if frame.lights_are_linked else program
+
+
+@cache
+def _linked_at_hits(program: Program) -> Program:
+    return replace(program, name=f"{program.name}, linked", defines=(*program.defines, ("HIT_LINKS", "1")))
 
 
 class Groups:

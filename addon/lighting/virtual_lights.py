@@ -53,6 +53,7 @@ from ..surfaces.reflectance import Reflectance
 from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
 from .light_choice import GROUP, Choice, seen_middle
+from .linked import linked_at_hits
 from .media import MediaService, dimmed
 
 PROBES, DRAFT_PROBES = (16, 12), (12, 8)
@@ -277,7 +278,7 @@ class VirtualLights:
         if self._emissive is not None:
             for index in numbers:
                 drawn = frame.random_volume_at(index, "virtual lights/emissive")
-                rows.append(self._emissive.row(drawn, share, lights.SHADOW_FLAG, samples=total / share))
+                rows.append(self._emissive.row(drawn, share, lights.SHADOW_FLAG, samples=total / share, at_hits=True))
         if self._world:
             chosen = np.array([frame.random_at(index, "virtual lights/world") for index in numbers])
             for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
@@ -305,6 +306,7 @@ class VirtualLights:
                 shadowed = int(emitter.light.cast_shadow)
                 row = emitter.row(sample, 0, shadowed, weight / points, points=total)
                 row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
+                row[0, 2] = lights.passing_bits(emitter.light.links.passing)
                 rows.append(row)
         return rows
 
@@ -318,7 +320,7 @@ class VirtualLights:
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
         bindings = self._probing(frame, grid)
-        program = dimmed(frame, candidates_program(self.kinds), bindings["textures"])
+        program = linked_at_hits(frame, dimmed(frame, candidates_program(self.kinds), bindings["textures"]))
         passes.fullscreen(program, found, **bindings)
         return {name if "next" in name else f"candidate_{name}": image for name, image in zip(FOUND, found.colors)}
 

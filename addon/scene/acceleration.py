@@ -35,7 +35,16 @@ from . import box_tree
 from .box_tree import LEAF
 from .instance_tree import MOST_BOXES, OWN_TREE, RECORD_NODES, Copies, UpperTree, is_point, kept, parted
 from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
-from .traced_triangles import ALL_RAYS, is_empty, is_met, mean_code, mean_emission, rays_met, world_triangles
+from .traced_triangles import (
+    ALL_RAYS,
+    is_empty,
+    is_met,
+    links_code,
+    mean_code,
+    mean_emission,
+    rays_met,
+    world_triangles,
+)
 
 LARGEST = 4_000_000  # triangles
 MOST_MESHES = 64  # trees of meshes that are kept though nothing shows them now
@@ -310,12 +319,15 @@ class HierarchyCache:
         meshes, materials, path, maps, glow = look
         some = [one for one in shown if meshes[one.mesh].triangle_count]
         expanded, kinds = parted(
-            some, meshes, lambda one: (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path)), LARGEST
+            some, meshes,
+            lambda one: (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), links_code(one)), LARGEST,
         )  # fmt: skip
         in_trees = (*expanded, *(some[own[0]] for own in kinds.values()))
         if sum(meshes[one.mesh].triangle_count for one in in_trees) > LARGEST:
             # What opacity and emission tell apart between instances would be too many trees: all have the first one's.
-            expanded, kinds = parted(some, meshes, lambda one: (one.mesh, one.materials, rays_met(one, path)), LARGEST)
+            expanded, kinds = parted(
+                some, meshes, lambda one: (one.mesh, one.materials, rays_met(one, path), links_code(one)), LARGEST
+            )
         number = {id(one): k for k, one in enumerate(shown)} if kinds else {}
         copies, used = [], {}
         for kind, own in kinds.items():
@@ -342,7 +354,7 @@ class HierarchyCache:
             if other[1] != rest or len(old) != len(shown) or trees.asked is instances:
                 continue  # or another set of this picture's, whose images are in use
             moved = [k for k, (a, b) in enumerate(zip(shown, old)) if a is not b]
-            if any((shown[k].mesh, shown[k].materials) != (old[k].mesh, old[k].materials) for k in moved):
+            if any(_looks(shown[k]) != _looks(old[k]) for k in moved):
                 continue
             own = () if trees.upper is None else set(trees.upper.numbers.tolist())
             copies = {k: shown[k] for k in moved if k in own}
@@ -373,6 +385,11 @@ class HierarchyCache:
 
     def release(self) -> None:
         self._kept, self._meshes = {}, {}
+
+
+def _looks(instance: Instance) -> tuple:
+    """What must be alike where an instance has only moved."""
+    return instance.mesh, instance.materials, links_code(instance)
 
 
 def _tree_of_mesh(instance: Instance, look: tuple) -> Tree:

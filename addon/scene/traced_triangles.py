@@ -15,7 +15,7 @@ import numpy as np
 
 from ..materials.compiled import CompiledMaterial
 from ..materials.energy import pane_passing
-from ..snapshot.scene import Instance, Mesh
+from ..snapshot.scene import LAST_GROUP, Instance, Mesh
 from .emission_maps import EmissionMaps, TriangleEmission
 from .opacity_maps import OpacityMaps, TriangleOpacity
 
@@ -24,6 +24,9 @@ AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one 
 ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
 MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
 FRONT_ALONE = 0.25  # added to the material's number
+# Above that number stand the groups of light linking, of receivers and of blockers, those beyond the last one as one:
+# all of it, and the quarter, is exact in one float.
+MATERIAL_BITS, GROUP_BITS = 14, 4
 SIDE_STEPS = 2047  # of the opacity of a side: those of two, and the above, are exact in one float
 NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 
@@ -57,9 +60,10 @@ def world_triangles(
     turns = np.linalg.det(matrices_of_all[:, :, :3])
     cofactors_of_all, first_of_kind = _cofactors(matrices_of_all[:, :, :3]), 0
     kinds = zip(shown, (
-        (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), turn < 0.0) for one, turn in zip(shown, turns)
+        (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), links_code(one), turn < 0.0)
+        for one, turn in zip(shown, turns)
     ))  # fmt: skip
-    for (key, slots, _, _, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
+    for (key, slots, _, _, rays, links, mirrored), group in groupby(kinds, lambda pair: pair[1]):
         mesh = meshes[key]
         of_triangle = mesh.triangle_materials(slots)
         look_of_triangle = look[rays, bool(mirrored)][of_triangle]
@@ -70,6 +74,7 @@ def world_triangles(
         shining = glow.of(copies[0])
         if shining is not None:
             _shine(look_of_triangle, of_triangle, shining, bool(mirrored))
+        look_of_triangle[:, 4] += links
         for first in range(0, len(copies), at_once):
             own = slice(first_of_kind + first, first_of_kind + min(first + at_once, len(copies)))
             matrices = matrices_of_all[own]
@@ -84,6 +89,12 @@ def world_triangles(
             made = new.stop
         first_of_kind += len(copies)
     return corners, looks
+
+
+def links_code(instance: Instance) -> int:
+    """What is added to the material's number for the groups of an instance."""
+    links = instance.links
+    return (min(links.receiver, LAST_GROUP) + (min(links.blocker, LAST_GROUP) << GROUP_BITS)) << MATERIAL_BITS
 
 
 def is_met(instance: Instance, path: str) -> bool:

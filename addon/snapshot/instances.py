@@ -302,7 +302,10 @@ def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
     """What of the object is not drawn as Cycles draws it."""
     said = []
     if _is_linked(owner):
-        said.append("light linking counts for light that reaches surfaces straight; bounced light follows none.")
+        said.append(
+            "light linking counts for light that reaches surfaces straight or from virtual lights; other bounced "
+            "light, that of volumes and caustics follow none."
+        )
     if kind in _DRAWN and owner.is_shadow_catcher and not final:
         said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
     return tuple(Note(f"Object '{name}'", text) for text in said)

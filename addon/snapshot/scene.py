@@ -99,6 +99,7 @@ class Links:
 
 
 NO_LINKS = Links()
+LAST_GROUP = 15  # that triangles of the hierarchy tell apart; those beyond count as this one there
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ import numpy as np
 from ..gfx import images
 from ..gfx.context import to_hold
 from ..gfx.struct import Block, Struct
-from ..snapshot.scene import Light, Links, Snapshot
+from ..snapshot.scene import LAST_GROUP, Light, Links, Snapshot
 from .lamp_maps import LampMaps
 
 TEXELS = 8
@@ -242,6 +242,12 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
             inverse[2],
         ]
     return Emitter(light, kind, flags, centre, radius, radiance, max(disc, 0.0), axis, 0.0, *rows)
+
+
+def passing_bits(passing: Iterable[int]) -> int:
+    """The groups of blockers that let light pass, which rows of lights for traced paths hold in place of a first view
+    (shaders/indirect/path.glsl); the last ones, which are one in the hierarchy, block."""
+    return sum(1 << group for group in passing if group < LAST_GROUP)
 
 
 def unlit_bits(links: Links) -> int:

@@ -42,6 +42,7 @@ from ..frame.technique import Param
 from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..kernels import lists
+from ..lighting.linked import linked_at_hits
 from ..lighting.media import dimmed
 from ..lighting.virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 from ..scene.view import VIEW
@@ -205,7 +206,7 @@ class MultiresRadiosity(InstantRadiosity):
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
         program = shared_gather_program(self.virtual_lights.kinds, *lobes_of(frame))
-        program = dimmed(frame, program, bindings["textures"])
+        program = linked_at_hits(frame, dimmed(frame, program, bindings["textures"]))
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield

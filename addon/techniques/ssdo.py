@@ -40,6 +40,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..lighting.linked import linked_at_hits
 from ..lighting.media import dimmed
 from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights
 from ..scene import acceleration
@@ -193,7 +194,7 @@ class ScreenSpaceBounce(Technique):
         return bindings
 
     def _in_bands(self, frame: Frame, program: Program, target, bindings: dict, blend="NONE") -> Iterator[None]:
-        program = dimmed(frame, program, bindings["textures"])
+        program = linked_at_hits(frame, dimmed(frame, program, bindings["textures"]))
         for rows in frame.bands(self):
             passes.fullscreen(program, target, rows=rows, blend=blend, **bindings)
             yield

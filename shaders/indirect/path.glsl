@@ -11,6 +11,7 @@
 #include "ask/media.glsl"
 
 #define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
+#define LAYERS_PASSED 16     // surfaces that a ray to a light goes through that they do not block
 
 struct Vertex {
   vec3 position;
@@ -18,6 +19,9 @@ struct Vertex {
   vec3 lit;     // the same, or on the other side: that from which light reaches it
   vec3 turned;  // that, as normal maps and bumps turn it: light straight from sources is reflected by it
   Reflection reflection;
+#ifdef HIT_LINKS
+  int group;    // of receivers (addon/snapshot/linking.py)
+#endif
 #ifdef MIRRORS_OWNED
   bool photons;  // lamps' light that it mirrors arrives as photons of caustics
 #endif
@@ -130,6 +134,9 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
     met.normal = -met.normal;
   }
   met.reflection = reflection_at(hit, met.position, met.normal, met.turned);
+#ifdef HIT_LINKS
+  met.group = triangle_links(hit).x;
+#endif
 #ifdef MIRRORS_OWNED
   int material = triangle_material(hit);
   met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
@@ -191,6 +198,27 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
 {
   float reach = light_reach(light, origin, direction);
   ivec2 hit;
+#ifdef HIT_LINKS
+  if (light.first_view != 0) {
+    // Groups of blockers that let its light pass: the ray goes on behind what belongs to them.
+    for (int i = 0; i < LAYERS_PASSED; i++) {
+      float t = trace_layers(origin, direction, reach, 0.0, salt, false, true, hit);
+      if (t >= reach) {
+        return 1.0;
+      }
+      if (((light.first_view >> triangle_links(hit).y) & 1) == 0) {
+        return 0.0;
+      }
+      vec3 normal = triangle_normal(hit);
+      origin = ray_origin(origin + t * direction, (dot(normal, direction) < 0.0) ? -normal : normal);
+      reach = max(reach - t, 0.0);
+      if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
+        reach = light_reach(light, origin, direction);
+      }
+    }
+    return 0.0;
+  }
+#endif
   return (trace_shadow(origin, direction, reach, salt, hit) >= reach) ? 1.0 : 0.0;
 }
 
@@ -212,6 +240,11 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
     vec3 chosen_direction = normal;
     for (int i = group; i < light_count; i += light_rays) {
       vec3 direction;
+#ifdef HIT_LINKS
+      if (((int(sources.light[i * LIGHT_TEXELS].x) >> 4 >> met.group) & 1) != 0) {
+        continue;
+      }
+#endif
       vec3 arriving = unblocked_irradiance(light_read(i), position, normal, direction);
       arriving *= (dot(direction, met.lit) > 0.0) ? 1.0 : 0.0;
       float share = luminance(abs(arriving));

@@ -21,7 +21,10 @@
 #define OPACITY_TEXEL 9  // opacity_of_four
 #define SIDES 2048.0     // one more than what an opaque side has
 #define MAPPED 4.0       // from here on a code tells of a tile
-#define MATERIAL_TEXEL 13  // its number; .25 more or less: the triangle emits to its front or to its back alone
+// Number of its material, and above the object's groups of light linking; .25 more or less: the triangle emits to its front
+// or to its back alone.
+#define MATERIAL_TEXEL 13
+#define MATERIAL_BITS 14
 #define NORMAL_TEXEL 14
 #ifdef INSTANCED
 #define HIT_SLOT(hit) (hit.y & 3)
@@ -437,8 +440,17 @@ vec3 triangle_normal(ivec2 hit)
 // The number of a triangle's material.
 int triangle_material(ivec2 hit)
 {
-  return int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[HIT_SLOT(hit)] + 0.5);
+  return int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[HIT_SLOT(hit)] + 0.5) & ((1 << MATERIAL_BITS) - 1);
 }
+
+#ifdef HIT_LINKS
+// Of the object that a triangle belongs to: its groups of receivers and of blockers.
+ivec2 triangle_links(ivec2 hit)
+{
+  int links = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[HIT_SLOT(hit)] + 0.5) >> MATERIAL_BITS;
+  return ivec2(links & 15, links >> 4);
+}
+#endif
 
 // Radiance that a triangle emits (mean over its material) to where a ray along `direction` comes from; and its normal.
 vec3 triangle_emission(ivec2 hit, vec3 direction, out vec3 normal)

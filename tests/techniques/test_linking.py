@@ -82,6 +82,25 @@ def test_lamps_beside_cycles(room, link):
     assert error <= 0.01 and without > 3 * error
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("link", (all_but_one, blocked_by_others))
+def test_bounced_light_follows_links_beside_cycles(room, link):
+    """A white wall beside the boxes sends on what they get; copies of one mesh stand in different groups."""
+    room.rectangle((-2, 0), (2, 2.5), material=room.diffuse(0.8), location=(0, 1.2, 0), turn=(np.pi / 2, 0, 0))
+    copy = room.link("Copy", room.boxes[0].data, (0.0, -1.0, 0.0))
+    room.boxes.insert(0, copy)
+    found = {}
+    for linked_now in (False, True):
+        if linked_now:
+            link(room, room.lamp)
+        for engine, samples in (("CANDELA", 64), ("CYCLES", 512)):
+            picture = room.render(samples, (32, 24), engine=engine, bounces=3)["diffuse_indirect"]
+            found[engine, linked_now] = float(picture.mean())
+    own, truth = (found[engine, True] / found[engine, False] for engine in ("CANDELA", "CYCLES"))
+    print(f"links make indirect light {own:.4f} times as bright, in Cycles {truth:.4f}")
+    assert abs(truth - 1) > 0.02 and abs(own - truth) < 0.25 * abs(truth - 1)
+
+
 def shining(stage):
     bpy.data.objects.remove(stage.lamp)
     glow = stage.material("ShaderNodeEmission", Strength=30.0)
@@ -166,7 +185,7 @@ def test_more_groups_than_there_are_bits_are_named(room):
 
 def test_what_is_not_followed_is_said(room):
     lit_alone(room, room.lamp)
-    assert any("bounced light follows none" in note.text for note in snapshot_of(room).notes)
+    assert any("caustics follow none" in note.text for note in snapshot_of(room).notes)
 
 
 def test_an_instance_is_linked_as_its_parent_is_before_itself():
