@@ -1,5 +1,7 @@
 """What a viewport shows while the programs of its picture are compiled, and how long a redraw takes then."""
 
+import warnings
+
 import bpy
 import numpy as np
 import pytest
@@ -10,6 +12,15 @@ from addon.scene.view import View
 from addon.surfaces.first_look import HEADLIGHT, FirstLook
 from addon.ui import ENGINE
 from tests.viewport.region import SIZE, Region
+
+
+def material_named(name):
+    """A new material with nodes, which Blender 4.5 does not give it by itself."""
+    made = bpy.data.materials.new(name)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        made.use_nodes = True
+    return made
 
 
 @pytest.fixture
@@ -56,7 +67,7 @@ def test_edit_that_needs_new_programs_leaves_the_old_picture_until_they_are_ther
     cold.clock.tick = 0.0
     before = cold.rest()
     cold.clock.tick = viewport.BUDGET_S
-    glass = bpy.data.materials.new("Glass")
+    glass = material_named("Glass")
     glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
     bpy.data.objects["Cube"].data.materials.append(glass)
     cold.viewport.dirty = True
@@ -80,7 +91,7 @@ def test_another_view_meanwhile_is_a_first_look_at_it(cold):
 def test_first_look_at_a_lambertian_plane_under_a_sun(registered, gpu_context, empty_scene):
     """Radiance of a surface that faces the sun: albedo times (irradiance + that of the light at the eye) over pi."""
     bpy.ops.mesh.primitive_plane_add(size=8)
-    material = bpy.data.materials.new("Red")
+    material = material_named("Red")
     material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.6, 0.2, 0.1, 1.0)
     bpy.context.object.data.materials.append(material)
     bpy.ops.object.light_add(type="SUN", rotation=(0.0, 0.0, 0.0))
@@ -101,7 +112,7 @@ def test_first_look_at_a_lambertian_plane_under_a_sun(registered, gpu_context, e
 @pytest.mark.parametrize(("opacity", "guides"), [("glass", 1.0), ("alpha", 0.0)])
 def test_what_lets_pass_hides_every_other_pixel_and_guides_by_its_shape_if_it_has_one(scene, opacity, guides):
     """A cube of glass, or of alpha 0.5: half of its pixels in a first look; as a guide all of them, or none."""
-    material = bpy.data.materials.new("Clear")
+    material = material_named("Clear")
     shader = material.node_tree.nodes["Principled BSDF"]
     name, value = {"glass": ("Transmission Weight", 1.0), "alpha": ("Alpha", 0.5)}[opacity]
     shader.inputs[name].default_value = value
