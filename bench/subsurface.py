@@ -286,7 +286,10 @@ def _radius(share: float) -> Callable[[str], None]:
 SCENES: dict[str, Callable[[str], None]] = {
     "slab under bars": slab, "sphere from behind": sphere_from_behind, "Suzanne, skin": suzanne_as_skin,
     "Suzanne, wax": suzanne_as_wax, "leaf": leaf, "candle": candle, "marble tile": marble_tile,
-    "world alone": under_the_world, "ears": ears, "wax block": block, "grapes": grapes, "hollow candle": hollow_candle,
+    "world alone": under_the_world,
+}  # fmt: skip
+THROUGH: dict[str, Callable[[str], None]] = {
+    "ears": ears, "wax block": block, "grapes": grapes, "hollow candle": hollow_candle,
     "cloth": cloth, "cloth, flipped": cloth_flipped, "milk": milk,
     **{f"radius {share:g}": _radius(share) for share in (0.1, 0.5, 1.0, 2.0)},
 }  # fmt: skip
@@ -319,7 +322,7 @@ def lines(
         return passes.images["combined"][..., :3].astype(np.float64), passes.seconds
 
     clear()
-    SCENES[name](method)
+    (SCENES | THROUGH)[name](method)
     bpy.context.scene.cycles.use_denoising = False
     first, second = (shown("CYCLES", reference, seed)[0] for seed in (11, 12))
     right = (first + second) / 2
@@ -339,8 +342,10 @@ def lines(
             _eevee[name, size] = picture, seconds
         error = max(float(((picture - right) ** 2 / scale).mean()) - noise, 0.0)
         label = f"{LABELS[engine]} {samples}"
-        mean = picture.mean() / max(right.mean(), 1e-30)
-        rows.append((name, method, label, f"{error:.4f}", f"{mean:.3f}", f"{seconds:.2f}", f"{noise:.4f}"))
+        mean = f"{picture.mean() / max(right.mean(), 1e-30):.3f}"
+        if name in THROUGH:
+            mean = " ".join(f"{c:.3f}" for c in picture.mean(axis=(0, 1)) / np.maximum(right.mean(axis=(0, 1)), 1e-30))
+        rows.append((name, method, label, f"{error:.4f}", mean, f"{seconds:.2f}", f"{noise:.4f}"))
         if (engine, samples) in (("CANDELA", 1), ("CANDELA", 64), ("BLENDER_EEVEE", 16)):
             beside.append(picture)
     if pictures is not None:
@@ -390,11 +395,23 @@ def page(rows: list[tuple[str, ...]], size: tuple[int, int], reference: int) -> 
     ])  # fmt: skip
 
 
+def page_through(rows: list[tuple[str, ...]], size: tuple[int, int], reference: int) -> str:
+    """The same of light that comes through: means by channel, and no summary."""
+    return "\n".join([
+        f"Pictures of {size[0]} x {size[1]} pixels, two bounces, against two renders of {reference} samples by Cycles",
+        "whose noise is taken off the errors; means of red, green and blue.", "", markdown.table([HEAD, *rows]),
+    ])  # fmt: skip
+
+
 COMMAND = "python -m bench subsurface --page docs/subsurface.md"
+COMMAND_THROUGH = "python -m bench subsurface --through --page docs/subsurface.md"
+FEW = (("CANDELA", 1), ("CANDELA", 16), (DENOISED, 16))  # entrants of light that comes through
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=list(SCENES), metavar="NAME")
+    every = [*SCENES, *THROUGH]
+    parser.add_argument("--scenes", nargs="+", choices=every, metavar="NAME", help="default all of either table")
+    parser.add_argument("--through", action="store_true", help="the table of light that comes through")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS, metavar="METHOD")
     parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out, which compiles for minutes")
     parser.add_argument("--size", type=size_of, default=(96, 96), metavar="WxH", help="default 96x96")
@@ -409,11 +426,14 @@ def command(options: argparse.Namespace) -> int:
     addon.register()
     rows: list[tuple[str, ...]] = []
     entrants = tuple(one for one in ENTRANTS if not (options.no_eevee and one[0] == "BLENDER_EEVEE"))
-    for name in options.scenes:
+    through = options.through
+    entrants = FEW if through else entrants
+    for name in options.scenes or (THROUGH if through else SCENES):
         for method in options.methods:
             added = lines(name, method, options.size, options.reference, options.pictures, entrants)
             print(table([HEAD, *added]), flush=True)
             rows += added
             if options.page:
-                markdown.put_between(options.page, COMMAND, page(rows, options.size, options.reference))
+                text = (page_through if through else page)(rows, options.size, options.reference)
+                markdown.put_between(options.page, COMMAND_THROUGH if through else COMMAND, text)
     return 0

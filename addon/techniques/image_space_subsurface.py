@@ -13,15 +13,15 @@ points of the mesh, which also cover what the camera does not see. A smooth wind
   world and emissive meshes by rays, and by indirect light (the virtual lights of the technique in that slot).
 
 Objects do not exchange light. Albedo and radius are those of the place where light leaves, as in Cycles. Burley's
-profile is summed over the surface as it is. The walk's mean over points is divided by the profile's, surfaces that face
-away count as often as walks through slabs and spheres find them, the total follows from the mean chord length of the
-object, and the exit depends on the angle of view (Chandrasekhar).
+profile is summed over the surface as it is. Where an object is thin or bent beside its range, the random walk is walked
+(lighting/walked_light.py). Elsewhere its mean over points is divided by the profile's, and the exit depends on the
+angle of view (Chandrasekhar).
 
 | cost | per sample |
 |---|---|
-| passes | 1 of the draws that scatter, 1 to 4 over the points, 2 over the picture |
+| passes | 1 of the draws that scatter, 1 to 4 over the points, 2 over the picture, 2 more for walks |
 | rays | a point: one per lamp point, `world directions` and `emissive points`; 4 for indirect light |
-| fetches, bytes per pixel | 5 per tap, 3 per point within reach, 1 per row; 32, and 64 while it runs; 384 a point |
+| fetches, bytes per pixel | 5 per tap, 3 per point within reach, 1 per row; 32, and 208 while it runs; 400 a point |
 
 Bias: distances are straight lines through what may be air; the mean over taps is a ratio of what is on screen; the
 walk's profile is that of a plane; without virtual lights indirect light comes from pixels alone. Bumps and diffuse

@@ -410,3 +410,16 @@ def test_walks_light_a_ball_from_behind_as_in_cycles(stage):
     stage.camera_above(0.9, 5.0)
     cycles = shown(stage.render(128, size=(24, 24), engine="CYCLES")).mean(axis=(0, 1))
     assert shown(stage.render(16, size=(24, 24))).mean(axis=(0, 1)) == pytest.approx(cycles, rel=0.05, abs=2e-4)
+
+
+@pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
+def test_what_is_painted_opaque_lets_no_light_through(stage, method):
+    material = scattering(stage, method, 0.1 if method == "RANDOM_WALK" else 1.0)
+    card = stage.card(material, 0.0, 1.0)
+    card.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.05
+    mask = _map("opaque on the right", lambda u: (float(u < 0.5),) * 3)
+    material.candela.image_space_subsurface_translucency_map = mask
+    stage.light("SUN", turn=(np.pi, 0, 0), energy=np.pi)
+    stage.camera_above(1.6)
+    picture = shown(stage.render(4, size=(24, 24)))[..., 0]
+    assert picture[:, :9].mean() > 0.3 and picture[:, 14:].max() < 0.02
