@@ -103,8 +103,13 @@ class Program:
         return tuple(name for kind, name in self.textures if kind in _FORMATS)[: _MOST_IMAGES - len(self.images)]
 
 
+GENERATED: dict[str, str] = {}  # texts that sources include like files, by name: see records.py
+
+
 @cache
 def _read(name: str) -> str:
+    if name in GENERATED:
+        return GENERATED[name]
     path = SHADER_ROOT / name
     try:
         return path.read_text(encoding="utf-8")

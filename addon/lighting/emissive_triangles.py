@@ -93,9 +93,9 @@ class EmissiveTriangles:
         flags += int(self.flags[k]) + lights.SIDED_FLAG * bool(self.sided[k])
         normal, radiance = self.normal[k], self.radiance[k]
         row = lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
-        row[0, 0] += self.unlit[k]
+        row[lights.LIGHT.at.kind] += self.unlit[k]
         if at_hits:
-            row[0, 2] = lights.passing_bits(self.passing[k])
+            row[lights.LIGHT.at.first_view] = lights.passing_bits(self.passing[k])
         return row
 
     def draw(self, x: float, y: float, z: float) -> tuple[int, np.ndarray, float]:

@@ -47,7 +47,7 @@ LINKS = Interface("links", "light/links.glsl", (("R32F", "receiver_groups"),), l
 
 def has_links(rows: list[np.ndarray]) -> bool:
     """Whether any of these lights, (TEXELS, 4) each, leaves out receivers."""
-    return any(int(row[0, 0]) >= lights.KIND_STEPS for row in rows)
+    return any(int(row[lights.LIGHT.at.kind]) >= lights.KIND_STEPS for row in rows)
 
 
 def linked(

@@ -169,7 +169,7 @@ def _by_channel(points: list[LightPoint], glass_tints: bool) -> Iterator[LightPo
             continue
         for channel in range(3):
             row = point.row.copy()
-            row[3, :3] *= np.arange(3) == channel
+            row[lights.LIGHT.at.radiance] *= np.arange(3) == channel
             yield replace(point, row=row, views=[replace(view, channel=channel + 1) for view in point.views])
 
 

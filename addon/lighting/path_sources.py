@@ -81,7 +81,7 @@ class PathSources:
             sample = emitter.sample(*frame.random_volume(f"{self.use}/light"))
             weight = max(count / self.most_lamps, 1.0)
             row = emitter.row(sample, 0, int(emitter.light.cast_shadow), weight)
-            row[0, 1] += lights.GLASS_BLOCKS_FLAG * (emitter.light.key in by_photons)
+            row[lights.LIGHT.at.flags] += lights.GLASS_BLOCKS_FLAG * (emitter.light.key in by_photons)
             rows.append(row)
         if self._triangles is not None:
             for k in range(self.emissive_points):

@@ -305,8 +305,8 @@ class VirtualLights:
                 total = points * frame.settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
                 row = emitter.row(sample, 0, shadowed, weight / points, points=total)
-                row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
-                row[0, 2] = lights.passing_bits(emitter.light.links.passing)
+                row[lights.LIGHT.at.flags] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
+                row[lights.LIGHT.at.first_view] = lights.passing_bits(emitter.light.links.passing)
                 rows.append(row)
         return rows
 

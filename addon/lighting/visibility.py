@@ -114,7 +114,7 @@ class LightPoint:
     @property
     def flags(self) -> int:
         """Of sources/lights.py."""
-        return int(self.row[0, 1])
+        return int(self.row[lights.LIGHT.at.flags])
 
 
 @dataclass(frozen=True)
@@ -418,7 +418,8 @@ def rounds(
             repeated_light.forbid(frame)
             own, views, texels = [], [], 0
         texels += size
-        point.row[0, 2:4] = len(views), len(point.views)
+        at = lights.LIGHT.at
+        point.row[at.first_view], point.row[at.view_count] = len(views), len(point.views)
         own.append(point)
         views += point.views
     if own:

@@ -13,33 +13,61 @@ import numpy as np
 
 from ..gfx import images
 from ..gfx.context import to_hold
+from ..gfx.records import Record
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import LAST_GROUP, Light, Links, Snapshot
 from .lamp_maps import LampMaps
 
-TEXELS = 8
+LIGHT = Record(
+    "Light",
+    fetch="sources.light[{}]",
+    texels=(
+        ("int kind:4 unlit", "int flags", "int first_view", "int view_count"),  # unlit: groups of receivers, a bit each
+        ("vec3 centre", "float radius"),  # suns, directions: unit vector towards the light, half angle
+        ("vec3 point", "float rate"),  # of this sample; how many of a light a sample has on average (rates.py)
+        ("vec3 radiance", "float area"),
+        ("vec3 axis", "float spread"),  # of emission, unit; tan of the half spread, 0: Lambertian
+    ),
+    asked=(
+        ("vec3 u", "float cone"),  # half width of an area light, or row of a spot's inverse matrix; cosine of half cone
+        ("vec3 v", "float edge"),  # half height, or row; 1 / ((1 - cosine) blend), 0: a hard edge
+        ("vec3 w", "float least"),  # row; least squared distance at which the point stands for its part of the light
+    ),
+    kinds=("POINT", "SPHERE", "SUN", "RECTANGLE", "ELLIPSE", "DIRECTION", "SURFACE"),
+    flags=(
+        "DIFFUSE", "GLOSSY", "SHADOW", "SPOT", "CAMERA",
+        "TRACED",  # rays of narrow lobes look for it
+        "WHOLE",  # it is not sampled by a point
+        "NEAR",  # rays are traced where it is near; no shader asks for it
+        "TRANSMISSION",
+        "SIDED",  # of a point on a surface: it shines only to where its normal points
+        "EVEN",  # of a world of one colour
+        "GLASS_BLOCKS",  # what passes glass arrives as photons of caustics
+        "MAPPED",  # its node tree varies; the bits above are the number of its map (lamp_maps.py)
+    ),
+    constants={"MAP_SHIFT": 13, "AS_A_WHOLE": 8},
+)  # fmt: skip
+TEXELS = LIGHT.texels
 VIEW_TEXELS = 5
 MOST_LIGHTS, MOST_VIEWS = 64, 96  # together just below the 16 KiB that every GPU grants a uniform block
 SOURCES = Struct("Sources", ("vec4", f"light[{MOST_LIGHTS * TEXELS}]"), ("vec4", f"view[{MOST_VIEWS * VIEW_TEXELS}]"))
-POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION, SURFACE = range(7)
+POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION, SURFACE = LIGHT.kinds.values()
 # What the lights of a pass may be, as bits: each kind, and WHOLE for those that are not sampled by a point. A lighting
 # pass is compiled for one of few sets, so that it leaves out the rest and a change of a lamp compiles nothing.
-WHOLE = 8
+WHOLE = LIGHT.constants["AS_A_WHOLE"]
 LAMPS = sum(1 << kind for kind in (POINT, SPHERE, SUN, RECTANGLE, ELLIPSE))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
 BRIGHTEST = 1e30  # W / (m2 sr): a light that would be brighter at its size counts as larger, or as a point
 NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its inverse may not fit
-DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = 1, 2, 4, 8, 16, 32, 64
-NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for it
-TRANSMISSION_FLAG = 256
-SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
-EVEN_FLAG = 1024  # of a world of one colour
-GLASS_BLOCKS_FLAG = 2048  # what passes glass arrives as photons of caustics
-KIND_STEPS = (
-    16  # a row's kind stands in the bits below; above, groups of receivers that a light does not light, 12 bits
+DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = (
+    LIGHT.flags[name] for name in ("DIFFUSE", "GLOSSY", "SHADOW", "SPOT", "CAMERA", "TRACED", "WHOLE")
 )
-MAPPED_FLAG, MAP_SHIFT = 4096, 13  # its node tree varies; the bits above are the number of its map (lamp_maps.py)
+NEAR_FLAG, TRANSMISSION_FLAG, SIDED_FLAG, EVEN_FLAG, GLASS_BLOCKS_FLAG, MAPPED_FLAG = (
+    LIGHT.flags[name] for name in ("NEAR", "TRANSMISSION", "SIDED", "EVEN", "GLASS_BLOCKS", "MAPPED")
+)
+KIND_STEPS = 16  # in the steps of a row's `kind` stand the groups of receivers that a light does not light, 12 bits
+MAP_SHIFT = LIGHT.constants["MAP_SHIFT"]
 
 
 @dataclass(frozen=True)
@@ -121,12 +149,12 @@ class Emitter:
     @cached_property
     def _fixed(self) -> np.ndarray:
         """What is the same in each row of it."""
-        rows = np.zeros((TEXELS, 4))
-        rows[1] = *self.centre, self.radius
-        rows[3, 3] = self.area
-        rows[4] = *self.axis, self.spread
-        for k, row in enumerate((self.u, self.v, self.w)):
-            rows[5 + k, : len(row)] = row
+        rows = LIGHT.rows(
+            centre=self.centre, radius=self.radius, area=self.area, axis=self.axis, spread=self.spread,
+            u=self.u[:3], v=self.v[:3], w=self.w,
+        )  # fmt: skip
+        if len(self.u) > 3:  # of a spot
+            rows[LIGHT.at.cone], rows[LIGHT.at.edge] = self.u[3], self.v[3]
         return rows
 
     def row(
@@ -138,10 +166,11 @@ class Emitter:
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
         kind = self.kind + (unlit_bits(self.light.links) if self.light is not None else 0)
         rows = self._fixed.copy()
+        at = LIGHT.at
         rows[0] = kind, flags, first_view, view_count
-        rows[2, :3], rows[2, 3] = sample, rate
-        rows[3, :3] = self.radiance * weight / rate
-        rows[7, 3] = footprint(self.area, points) if self.kind != SUN else 0.0
+        rows[at.point], rows[at.rate] = sample, rate
+        rows[at.radiance] = self.radiance * weight / rate
+        rows[at.least] = footprint(self.area, points) if self.kind != SUN else 0.0
         return rows if self.maps is None else MappedRow.of(rows, self.maps)
 
 
@@ -319,12 +348,11 @@ def direction_row(
 ) -> np.ndarray:
     """A row for light from one direction at infinity, as the environment draws them, `rate` in a sample; `openness`:
     of what is drawn from there, how much is expected to arrive."""
-    rows = np.zeros((TEXELS, 4))
-    rows[0] = DIRECTION, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
-    rows[1] = *direction, openness
-    rows[2, 3] = rate
-    rows[3] = *(np.asarray(radiance_over_density) / rate), density
-    return rows
+    return LIGHT.rows(
+        kind=DIRECTION, flags=flags if view_count else flags & ~SHADOW_FLAG, first_view=first_view,
+        view_count=view_count, centre=direction, radius=openness, rate=rate,
+        radiance=np.asarray(radiance_over_density) / rate, area=density,
+    )  # fmt: skip
 
 
 def surface_row(
@@ -332,14 +360,11 @@ def surface_row(
 ) -> np.ndarray:
     """A row for a point on an emissive surface, drawn with `density` per m2 in each of `samples` samples; it shines to
     both sides, but for SIDED_FLAG."""
-    rows = np.zeros((TEXELS, 4))
-    rows[0] = SURFACE, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
-    rows[1, :3] = point
-    rows[2] = *point, 1.0
-    rows[3] = *radiance, 1.0 / density
-    rows[4, :3] = normal
-    rows[7, 3] = footprint(1.0 / density, samples)
-    return rows
+    return LIGHT.rows(
+        kind=SURFACE, flags=flags if view_count else flags & ~SHADOW_FLAG, first_view=first_view,
+        view_count=view_count, centre=point, point=point, rate=1.0, radiance=radiance, area=1.0 / density, axis=normal,
+        least=footprint(1.0 / density, samples),
+    )  # fmt: skip
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

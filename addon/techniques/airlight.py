@@ -201,9 +201,8 @@ class Airlight(Technique):
     def _lit_by(self, frame: Frame, media: MediaService) -> Lit:
         """What shines into media in this sample."""
         rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
-        kinds = lights.kinds_of(emitters) | sum(
-            1 << kind for kind in {int(row[0, 0]) % lights.KIND_STEPS for row in rows} if kind >= lights.DIRECTION
-        )
+        found = {int(row[lights.LIGHT.at.kind]) % lights.KIND_STEPS for row in rows}
+        kinds = lights.kinds_of(emitters) | sum(1 << kind for kind in found if kind >= lights.DIRECTION)
         textures = {**frame.hierarchy("volume").textures, **media.media.textures}
         blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}
         if self._lit_by_world:

@@ -119,7 +119,7 @@ class DirectLight(Technique):
                 views = provider.views(frame, shown, sample, number, cell)
                 asked = len(views) or near or not provider.asks_views
                 row = shown.row(sample, 0, asked, weight, rate.per_sample * share, points * share)
-                row[0, 1] += lights.WHOLE_FLAG * whole + flags + lights.NEAR_FLAG * near
+                row[lights.LIGHT.at.flags] += lights.WHOLE_FLAG * whole + flags + lights.NEAR_FLAG * near
                 found.append(LightPoint(row, provider, views))
         return found
 

@@ -134,7 +134,7 @@ class EmissiveLight(Technique):
         row = self._triangles.row(numbers, count, flags, len(views), frame.settings.samples)
         across = np.cross(normal, (1.0, 0.0, 0.0) if abs(normal[0]) < 0.9 else (0.0, 1.0, 0.0))
         across *= radius / max(float(np.linalg.norm(across)), 1e-30)
-        row[5, :3], row[6, :3] = across, np.cross(normal, across)
+        row[lights.LIGHT.at.u], row[lights.LIGHT.at.v] = across, np.cross(normal, across)
         return LightPoint(row, provider, views)
 
     def _count(self, settings: Settings) -> int:

@@ -109,8 +109,8 @@ class EnvironmentAreaLights(Technique):
                 views = depth_maps.directional_views(sample, frame.receivers, frame.geometry, jitter, resolution, reach)
                 views = [replace(view, cell=cell) for view in views]
             row = emitter.row(sample, 0, len(views))
-            row[0, 1] += lights.WHOLE_FLAG * (cell >= 1.0)
-            row[2, 3] = NO_SHARE
+            row[lights.LIGHT.at.flags] += lights.WHOLE_FLAG * (cell >= 1.0)
+            row[lights.LIGHT.at.rate] = NO_SHARE
             points.append(LightPoint(row, maps_of, views))
         frame.count(self, "maps", sum(len(point.views) for point in points))
         yield from light_surfaces(frame, self, points, kinds, self._sources)

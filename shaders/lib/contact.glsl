@@ -17,7 +17,7 @@ Light contact_point(Light light, vec2 place, float share, vec3 position)
   vec2 disc = sqrt(place.y) * vec2(cos(turn), sin(turn));
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE) || LIGHT_IS(light, LIGHT_SURFACE)) {
     vec2 within = (LIGHT_IS(light, LIGHT_RECTANGLE) ? square : disc) * share;
-    light.point += within.x * sources.light[light.base + 5].xyz + within.y * sources.light[light.base + 6].xyz;
+    light.point += within.x * light_u(light) + within.y * light_v(light);
     return light;
   }
   bool sun = LIGHT_IS(light, LIGHT_SUN);

@@ -15,8 +15,8 @@ vec2 kernel_extent(Light light, ShadowReceiver r, float share)
   vec3 along = sources.view[r.view * VIEW_TEXELS + 1].xyz - r.ndc.y * row_w;
   vec2 extent;
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE) || LIGHT_IS(light, LIGHT_SURFACE)) {
-    vec3 u = sources.light[light.base + 5].xyz;
-    vec3 v = sources.light[light.base + 6].xyz;
+    vec3 u = light_u(light);
+    vec3 v = light_v(light);
     // A light that reaches towards the receiver as far as half its distance, as faces beside its axis see it, has no
     // kernel in this map: only a part of it that has.
     float towards = length(vec2(dot(row_w, u), dot(row_w, v)));

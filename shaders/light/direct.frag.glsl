@@ -93,7 +93,7 @@ void main()
 #ifdef OWN_POINTS
     light = own_point(light, i);
 #endif
-    bool whole = LIGHTS_HAVE(LIGHTS_AS_A_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
+    bool whole = LIGHTS_HAVE(LIGHT_AS_A_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
     bool on_diffuse = has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0;
     bool on_glossy = has_glossy && (light.flags & LIGHT_GLOSSY) != 0;
     bool by_points = !whole || on_glossy;

@@ -1,93 +1,22 @@
 // Light sources as Cycles has them: where a sample of each lies for a receiver, how much it gives, and what a ray hits.
 //
-// The uniform block `sources` (addon/sources/lights.py) holds LIGHT_TEXELS vec4 per light, in `light[]`:
-//   0: kind, flags, first depth-map view, number of views
-//   1: centre, radius                 (sun, direction: unit vector towards the light, half angle)
-//   2: this sample's point            (point, spot: offset from the centre; area: position; sun: direction)
-//      w: how many points of the light a sample of the picture has on average (addon/sources/rates.py)
-//   3: radiance, area                 (radius 0: radiant intensity; direction: radiance / density, density;
-//                                      point of an emissive surface: radiance, 1 / density)
-//   4: emission axis (unit)           w: tan of the half spread, 0 = Lambertian
-//   5: half width vector (area), or row 0 of the inverse spot matrix; w: cosine of the half cone
-//   6: half height vector, or row 1;  w: 1 / ((1 - cosine) blend), 0 = hard edge
-//   7: row 2;                         w: least squared distance at which the point stands for its part of the light
+// The uniform block `sources` holds a record Light for each, declared in addon/sources/lights.py. Beside what stands there:
+// of suns and directions `centre` is the unit vector towards the light and `radius` the half angle; `point` is the offset
+// from the centre (point, spot), the position (area) or the direction (sun); `radiance` is radiant intensity where the
+// radius is 0, radiance / density of a direction, whose `area` is its density.
+#include "record/light.glsl"
 #include "lib/math.glsl"
 #ifdef HAS_LAMP_MAPS
 #include "light/lamp_map.glsl"
 #endif
-
-#define LIGHT_TEXELS 8
-#define LIGHT_POINT 0
-#define LIGHT_SPHERE 1
-#define LIGHT_SUN 2
-#define LIGHT_RECTANGLE 3
-#define LIGHT_ELLIPSE 4
-#define LIGHT_DIRECTION 5
-#define LIGHT_SURFACE 6
-
-#define LIGHT_DIFFUSE 1
-#define LIGHT_GLOSSY 2
-#define LIGHT_SHADOW 4
-#define LIGHT_SPOT 8
-#define LIGHT_CAMERA 16
-#define LIGHT_TRACED 32  // rays of narrow lobes look for it (light/traced.frag.glsl)
-#define LIGHT_TRANSMISSION 256
-#define LIGHT_SIDED 512
-#define LIGHT_EVEN 1024
-#define LIGHT_GLASS_BLOCKS 2048
-#define LIGHT_MAPPED 4096  // its node tree varies: factors of light/lamp_map.glsl
-#define LIGHT_MAP_SHIFT 13  // the bits above are the number of its map
 
 // What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/sources/lights.py). What
 // is left out some drivers would compute and mask.
 #ifndef LIGHT_KINDS
 #define LIGHT_KINDS -1
 #endif
-#define LIGHTS_AS_A_WHOLE 8
 #define LIGHTS_HAVE(kind_number) ((LIGHT_KINDS & (1 << (kind_number))) != 0)
 #define LIGHT_IS(light, number) (LIGHTS_HAVE(number) && (light).kind == (number))
-
-struct Light {
-  int kind;
-  int unlit;  // groups of receivers that it leaves out, a bit each
-  int flags;
-  int first_view;
-  int view_count;
-  vec3 centre;
-  float radius;
-  vec3 point;
-  float rate;
-  vec3 radiance;
-  float area;
-  vec3 axis;
-  float spread;
-  int base;
-};
-
-Light light_read(int index)
-{
-  Light light;
-  light.base = index * LIGHT_TEXELS;
-  vec4 a = sources.light[light.base];
-  vec4 b = sources.light[light.base + 1];
-  vec4 d = sources.light[light.base + 3];
-  vec4 e = sources.light[light.base + 4];
-  light.kind = int(a.x) & 15;
-  light.unlit = int(a.x) >> 4;
-  light.flags = int(a.y);
-  light.first_view = int(a.z);
-  light.view_count = int(a.w);
-  light.centre = b.xyz;
-  light.radius = b.w;
-  vec4 c = sources.light[light.base + 2];
-  light.point = c.xyz;
-  light.rate = c.w;
-  light.radiance = d.xyz;
-  light.area = d.w;
-  light.axis = e.xyz;
-  light.spread = e.w;
-  return light;
-}
 
 // What the node tree of a lamp makes of light that leaves it along `direction` (unit), from a place, and goes so far.
 vec3 light_tree(Light light, vec3 direction, vec3 from, float path)
@@ -103,18 +32,17 @@ vec3 light_tree(Light light, vec3 direction, vec3 from, float path)
 // Falloff of a spot for a ray that leaves it along `direction`.
 float spot_attenuation(Light light, vec3 direction)
 {
-  vec4 r0 = sources.light[light.base + 5];
-  vec4 r1 = sources.light[light.base + 6];
-  vec4 r2 = sources.light[light.base + 7];
-  vec3 local = safe_normalize(vec3(dot(r0.xyz, direction), dot(r1.xyz, direction), dot(r2.xyz, direction)));
-  float inside = -local.z - r0.w;
+  vec3 local = safe_normalize(
+      vec3(dot(light_u(light), direction), dot(light_v(light), direction), dot(light_w(light), direction)));
+  float inside = -local.z - light_cone(light);
   if (inside <= 0.0) {
     return 0.0;
   }
-  if (r1.w <= 0.0) {
+  float edge = light_edge(light);
+  if (edge <= 0.0) {
     return 1.0;
   }
-  float x = clamp(inside * r1.w, 0.0, 1.0);
+  float x = clamp(inside * edge, 0.0, 1.0);
   return x * x * (3.0 - 2.0 * x);
 }
 
@@ -155,7 +83,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     float squared = max(dot(to_light, to_light), 1e-30);
     direction = to_light * inversesqrt(squared);
     float path = sqrt(squared);
-    squared = max(squared, sources.light[light.base + 7].w);
+    squared = max(squared, light_least(light));
     float cos_light = -dot(direction, light.axis);
     if (LIGHT_IS(light, LIGHT_SURFACE)) {
       cos_light = ((light.flags & LIGHT_SIDED) != 0) ? cos_light : abs(cos_light);
@@ -209,7 +137,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       vec3 to_point = to_centre + across;
       float squared = max(dot(to_point, to_point), 1e-30);
       direction = to_point * inversesqrt(squared);
-      squared = max(squared, sources.light[light.base + 7].w);
+      squared = max(squared, light_least(light));
       float solid_angle = light.area * max(dot(direction, axis), 0.0) / squared;
       density = 1.0 / max(solid_angle, 1e-30);
       result = light.radiance * solid_angle;
@@ -269,8 +197,8 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
       return vec3(0.0);
     }
     float t = dot(origin - light.centre, light.axis) / cos_light;
-    vec3 u = sources.light[light.base + 5].xyz;
-    vec3 v = sources.light[light.base + 6].xyz;
+    vec3 u = light_u(light);
+    vec3 v = light_v(light);
     vec3 offset = origin + t * direction - light.centre;
     vec2 place = vec2(dot(offset, u) / max(dot(u, u), 1e-30), dot(offset, v) / max(dot(v, v), 1e-30));
     bool inside = LIGHT_IS(light, LIGHT_RECTANGLE) ? max(abs(place.x), abs(place.y)) <= 1.0 : dot(place, place) <= 1.0;

@@ -5,15 +5,14 @@
 // polygons of 12 sides and equal area (error below 1e-3 of the irradiance at a distance of half the radius).
 #include "light/sources.glsl"
 
-#define LIGHT_WHOLE 64  // the light is not sampled by a point: it counts as a whole
 #define ELLIPSE_SIDES 12
 #define WHOLE_PARTS 4
 
 // From the light's centre.
 vec3 whole_corner(Light light, int k)
 {
-  vec3 u = sources.light[light.base + 5].xyz;
-  vec3 v = sources.light[light.base + 6].xyz;
+  vec3 u = light_u(light);
+  vec3 v = light_v(light);
   if (LIGHT_IS(light, LIGHT_RECTANGLE)) {
     return ((k == 0 || k == 3) ? -u : u) + ((k < 2) ? -v : v);
   }
@@ -139,7 +138,7 @@ Light whole_part(Light light, int k, vec3 position)
   light.radiance /= float(WHOLE_PARTS);
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
     place *= LIGHT_IS(light, LIGHT_ELLIPSE) ? 0.866 : 1.0;  // discs: the same second moments
-    light.point = light.centre + place.x * sources.light[light.base + 5].xyz + place.y * sources.light[light.base + 6].xyz;
+    light.point = light.centre + place.x * light_u(light) + place.y * light_v(light);
     return light;
   }
   vec3 axis = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - position);

@@ -19,14 +19,14 @@ float in_cone(vec3 start, vec3 way, float cosine, float t)
 // The part of a ray that is in a spot's cone, of `apex`; it is one, as cones are convex.
 void clip_to_cone(Light light, vec3 apex, vec3 origin, vec3 direction, inout float begin, inout float end)
 {
-  vec4 r0 = sources.light[light.base + 5];
-  vec4 r1 = sources.light[light.base + 6];
-  vec4 r2 = sources.light[light.base + 7];
+  vec4 r0 = vec4(light_u(light), light_cone(light));
+  vec3 r1 = light_v(light);
+  vec3 r2 = light_w(light);
   vec3 offset = origin - apex;
-  vec3 start = vec3(dot(r0.xyz, offset), dot(r1.xyz, offset), dot(r2.xyz, offset));
-  vec3 way = vec3(dot(r0.xyz, direction), dot(r1.xyz, direction), dot(r2.xyz, direction));
+  vec3 start = vec3(dot(r0.xyz, offset), dot(r1, offset), dot(r2, offset));
+  vec3 way = vec3(dot(r0.xyz, direction), dot(r1, direction), dot(r2, direction));
   // Light leaves all of a round lamp: the cone around all of their cones begins behind it.
-  start.z -= light.radius * length(r2.xyz) / sqrt(max(1.0 - r0.w * r0.w, 1e-6));
+  start.z -= light.radius * length(r2) / sqrt(max(1.0 - r0.w * r0.w, 1e-6));
   float squared = r0.w * r0.w;
   float a = way.z * way.z - squared * dot(way, way);
   if (r0.w <= 0.0 || abs(a) < 1e-6 * dot(way, way)) {
@@ -63,7 +63,7 @@ Light light_at(Light light, vec2 u)
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
     vec2 place = LIGHT_IS(light, LIGHT_RECTANGLE) ? 2.0 * u - 1.0
                                                   : sqrt(u.x) * vec2(cos(2.0 * PI * u.y), sin(2.0 * PI * u.y));
-    light.point = light.centre + place.x * sources.light[light.base + 5].xyz + place.y * sources.light[light.base + 6].xyz;
+    light.point = light.centre + place.x * light_u(light) + place.y * light_v(light);
   }
   return light;
 }

@@ -44,9 +44,9 @@ LampRays lamp_rays(int number, vec2 u)
     rays.by_cosine = true;
   }
   if ((light.flags & LIGHT_SPOT) != 0) {
-    vec4 r0 = sources.light[light.base + 5];
-    vec3 r1 = sources.light[light.base + 6].xyz;
-    vec3 r2 = sources.light[light.base + 7].xyz;
+    vec4 r0 = vec4(light_u(light), light_cone(light));
+    vec3 r1 = light_v(light);
+    vec3 r2 = light_w(light);
     float size = dot(r2, r2);
     // The cone of one that is stretched sideways is not round.
     bool even = abs(dot(r0.xyz, r0.xyz) - size) < 1e-3 * size && abs(dot(r1, r1) - size) < 1e-3 * size;

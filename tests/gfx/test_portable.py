@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from addon.gfx.library import SHADER_ROOT, resolve
+from addon.gfx.library import GENERATED, SHADER_ROOT, resolve
 from tests.gfx.declared import programs
 
 FILES = sorted(path.relative_to(SHADER_ROOT).as_posix() for path in SHADER_ROOT.rglob("*.glsl"))
@@ -29,7 +29,8 @@ def sources(program):
     )
 
 
-STRUCTS = {name for file in FILES for name in STRUCT.findall(code_of((SHADER_ROOT / file).read_text(encoding="utf-8")))}
+TEXTS = (*((SHADER_ROOT / file).read_text(encoding="utf-8") for file in FILES), *GENERATED.values())
+STRUCTS = {name for text in TEXTS for name in STRUCT.findall(code_of(text))}
 
 
 @pytest.mark.parametrize("file", FILES)
