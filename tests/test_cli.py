@@ -199,6 +199,16 @@ def test_render_writes_the_picture_and_prints_the_ledger(tmp_path):
 
 
 @pytest.mark.slow
+def test_render_shows_an_intermediate_image_and_names_those_there_are(tmp_path):
+    output = tmp_path / "normal.exr"
+    done = candela("render", CORNELL, *TINY, "--show", "surface.normal", "--output", output, folder=tmp_path)
+    assert done.returncode == 0 and "surface.normal: RGBA32F, channels from -1 to 1" in done.stdout
+    assert np.abs(read_exr(output)["surface.normal"]).max() == pytest.approx(1.0, abs=0.01)
+    refused = candela("render", CORNELL, *TINY, "--show", "nothing", "--output", output, folder=tmp_path)
+    assert_refused(refused, 2, "no image nothing", "surface.normal", "film.combined")
+
+
+@pytest.mark.slow
 def test_render_writes_the_files_passes_as_multilayer_exr(tmp_path):
     output = tmp_path / "picture.exr"
     done = candela("render", CORNELL, *TINY, "--output", output, folder=tmp_path)

@@ -110,6 +110,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
         "--frames", metavar="A-B", type=_frames,
         help="several frames, such as 1-10, 1-100:5 or 1,3,7; the name of the output has #### for their number",
     )  # fmt: skip
+    render.add_argument("--show", metavar="IMAGE", help="one of the images by which the picture is made in its place")
     render.add_argument("--slice", metavar="K/N", help="the Kth of N parts of the samples, as .exr; see merge")
     _add_farming(render)
     render.set_defaults(verb=verbs.render, opens=True)

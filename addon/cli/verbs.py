@@ -31,6 +31,7 @@ from ..techniques import REGISTRY, make_registry
 from ..ui.properties import put_values, settings_of
 from . import slices, untrusted
 from .files import output, placed_in, refuse_blend
+from .intermediate import write_intermediate
 from .refused import USAGE, Refused, reason
 from .terminal import STDOUT, progress, quiet
 
@@ -189,11 +190,14 @@ def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
                     bpy.ops.render.render(scene=scene.name, **target)
                 except RuntimeError as error:
                     raise Refused(f"{options.file} could not be rendered: {reason(error)}.") from None
-            if sliced:
+            shown = getattr(options, "show", None)
+            if shown:
+                print(write_intermediate(scene, shown, folder / path.name))
+            elif sliced:
                 slices.write(folder / path.name, about | {"device": context.describe()}, engine.taken)
         finally:
             engine.taken = None
-        if not sliced:
+        if not (sliced or shown):
             _choose_format(scene.render.image_settings, path.suffix.lower(), scene.render.film_transparent)
             with quiet(options.verbose):
                 result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
@@ -204,8 +208,8 @@ def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
     print(job.title)
     _print_ledger()
     _print_held_back(held_back)
-    shown = one_line(str(path))
-    print(f"Saved: '{shown}'" if getattr(options, "progress", False) else shown, flush=True)
+    saved = one_line(str(path))
+    print(f"Saved: '{saved}'" if getattr(options, "progress", False) else saved, flush=True)
 
 
 def _choose_format(image, suffix: str, transparent: bool) -> None:

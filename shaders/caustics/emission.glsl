@@ -1,5 +1,6 @@
 // What a texel of a light's view stands for, and how wide lobes are; `film_view` is the light's view.
 // Leaves out links: light that comes by way of surfaces reaches every receiver.
+#include "lib/random.glsl"
 #include "ask/media.glsl"
 
 // What media let pass of light along a stretch of a photon's way: with the same random numbers for all photons of a sample,

@@ -7,7 +7,7 @@ from itertools import chain, combinations
 import pytest
 
 from addon.gfx.interface import Interface, answered, asked_by
-from addon.gfx.library import MOST_TEXTURES, SHADER_ROOT, resolve
+from addon.gfx.library import MOST_TEXTURES, SHADER_ROOT, get, resolve
 from addon.lighting.grass import GRASS
 from addon.lighting.linked import LINKS
 from addon.lighting.loop import RAYS_WHERE_NEAR, lighting
@@ -63,3 +63,13 @@ def test_a_program_that_reads_lights_asks_what_dims_them_or_says_why_not():
                 if kind.name not in said and not files & {kind.asked, kind.glsl}
             ]  # fmt: skip
     assert not silent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", sorted({one.fragment or one.compute for one in programs() if asked_by(one)}))
+def test_a_shader_compiles_without_and_with_all_that_it_asks(file, gpu_context):
+    """One program of each shader that asks: a file that forgets an include finds it in the other's."""
+    program = next(one for one in programs() if file in (one.fragment, one.compute) and asked_by(one))
+    *_, everything = subsets(program)
+    for present in ((), everything):
+        get(answered(program, present))
