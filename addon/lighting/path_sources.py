@@ -19,6 +19,7 @@ from ..materials.compiler import may_emit
 from ..sources import lights
 from .emissive_triangles import PATHS, EmissiveTriangles
 
+SHOWN_THROUGH = "transmission.shown"  # image: the same of what is seen through glass
 SHOWN = "reflection.shown"  # image: how much surfaces reflect that reflections show, summed up over samples
 
 

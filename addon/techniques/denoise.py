@@ -1,6 +1,6 @@
 """Denoise: noise that is left in light after the last sample is filtered where variance tells it from shading.
 
-    light = sum / colour            of diffuse and glossy light, each path by itself; of media without colour
+    light = sum / colour            of diffuse and glossy light, each path by itself; of media and through glass without
     out   = light(p) + sum over pixels q  w(p, q) (light(q) - light(p))
     w     = binomial * same surface * exp(-(light(p) - light(q))^2 / s^2)
     s^2   = k^2 sqrt(var(p) var(q)) + light(p) light(q) / 100^2
@@ -9,11 +9,12 @@ An edge-avoiding wavelet of three or five levels (Dammertz, Sewtz, Hanika and Le
 Schied et al. 2017 (SVGF). The variance comes from the picture itself: the sums are copied half-way through the samples,
 and half the squared difference of the two halves' means, averaged over 3x3 pixels of the same surface, estimates it.
 That includes noise shared by all pixels (one set of virtual lights or light points). k is 3 for direct light, 5.5 for
-diffuse indirect light, whose edges are softer, and 5 for glossy light.
+diffuse indirect light, whose edges are softer, 5 for indirect gloss, and 2 for lamps in gloss and what glass shows,
+whose edges are sharp.
 
 w is symmetric and the centre keeps what the weights lack to one: pixels exchange light and none is lost, however skewed
 the noise. Its variance is the geometric mean, so that a bright rim does not spread into its dark surroundings. Pixels
-exchange glossy light only if what their lobes show reflects alike (shaded_reflections.py). Where both halves agree
+exchange light of lobes and glass only if these show what reflects alike (hits/guide.frag.glsl). Where both halves agree
 nothing changes, so the result still converges; textures are divided out before and stay.
 
 | cost | after the last sample |
@@ -23,7 +24,7 @@ nothing changes, so the result still converges; textures are divided out before 
 
 Bias: light is spread by at most 14 pixels over a surface, indirect light by 32, by an amount that the standard error
 hides; means stay. Fails: creases in sunlit scenes whose indirect light fades within some pixels are blurred. Not
-filtered: direct gloss, glass, emission, pixels without the path's colour, pictures of one sample, drafts.
+filtered: emission, pixels without the path's colour, pictures of one sample, drafts.
 
 Errors with and without it, and what was tried and left: docs/log/2026-11-26-denoise.md.
 """
@@ -40,7 +41,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..lighting.grass import GrassTable
-from ..lighting.path_sources import SHOWN
+from ..lighting.path_sources import SHOWN, SHOWN_THROUGH
 from ..scene.media import has_media
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -59,11 +60,17 @@ class Filter:
 FILTERS = {
     "diffuse_direct": Filter(3.0, 32.0, (1, 2, 4)),
     "diffuse_indirect": Filter(5.5, 8.0, (1, 2, 4, 8, 1)),
+    "glossy_direct": Filter(2.0, 32.0, (1, 2)),
     "glossy_indirect": Filter(5.0, 8.0, (1, 2, 4, 8, 1)),
+    "transmission_direct": Filter(2.0, 32.0, (1, 2)),
+    "transmission_indirect": Filter(2.0, 32.0, (1, 2, 4)),
     "volume_direct": Filter(3.0, 8.0, (1, 2, 4)),
     "volume_indirect": Filter(5.0, 8.0, (1, 2, 4, 8, 1)),
 }
 OF_MEDIA = ("volume_direct", "volume_indirect")  # exchanged along what is seen equally far away; no colour
+THROUGH_GLASS = ("transmission_direct", "transmission_indirect")  # with their colour, which is what glass shows, too
+GUIDES_OF_LOBES = {"glossy_direct": SHOWN, "glossy_indirect": SHOWN, **dict.fromkeys(THROUGH_GLASS, SHOWN_THROUGH)}
+BY_NEED = OF_MEDIA + THROUGH_GLASS
 FEWEST = 2  # samples: one for each half
 GUIDES = (("RGBA32F", "surface_position"), ("RGBA32F", "normal_sum"))
 LEAST_COLOR = (("LEAST_COLOR", "1e-4"),)  # albedo below this sends nothing that is seen
@@ -97,7 +104,12 @@ BEGIN_OF_MEDIA = replace(
 LEVEL_OF_MEDIA = replace(
     LEVEL, name="denoise: level of media", textures=(GUIDES[0], *LEVEL.textures[2:]), defines=(("OF_MEDIA", "1"),)
 )
-# The same for reflections, whose edges no surface has: `shown_sum` is image SHOWN.
+# The same for light through glass.
+BEGIN_THROUGH_GLASS = replace(
+    BEGIN, name="denoise: light through glass and variance", textures=BEGIN.textures[:4],
+    defines=(("THROUGH_GLASS", "1"),),
+)  # fmt: skip
+# The same for reflections and glass, which show edges that no surface has: `shown_sum` is SHOWN or SHOWN_THROUGH.
 LEVEL_OF_REFLECTIONS = replace(
     LEVEL,
     name="denoise: level of reflections",
@@ -139,9 +151,9 @@ class Denoise(Technique):
                     f"denoise.{path}_half",
                     "RGBA32F",
                     "What the first half of the samples summed up",
-                    by_need=path in OF_MEDIA,
+                    by_need=path in BY_NEED,
                 ),
-                Write(f"denoise.{path}", "RGBA32F", "The sum of all samples, denoised", by_need=path in OF_MEDIA),
+                Write(f"denoise.{path}", "RGBA32F", "The sum of all samples, denoised", by_need=path in BY_NEED),
             )
         ),
     )
@@ -215,13 +227,16 @@ class Denoise(Technique):
 
     def _paths(self, frame: Frame) -> list[str]:
         shown = shown_paths(frame)
-        return [path for path in FILTERS if path in shown]
+        return [path for path in FILTERS if path in shown and f"radiance.{path}" in frame.images]
 
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:
         sums, guides = {"sum_now": frame.images[f"film.{path}"]}, {"surface_position": frame.images["surface.position"]}
         begin, level, end = (BEGIN_OF_MEDIA, LEVEL_OF_MEDIA, END_OF_MEDIA) if path in OF_MEDIA else (BEGIN, LEVEL, END)
-        if path not in OF_MEDIA:
+        if path in THROUGH_GLASS:
+            begin, end = BEGIN_THROUGH_GLASS, END_OF_MEDIA
+        elif path not in OF_MEDIA:
             sums["color_sum"] = frame.images[f"color.{path.split('_')[0]}"]
+        if path not in OF_MEDIA:
             guides["normal_sum"] = frame.images["surface.normal_sum"]
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
         half_count, half = self._half(frame, path, count)
@@ -235,9 +250,9 @@ class Denoise(Technique):
                     constants={"count": count, "half_count": half_count, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield
-            shown = {}
-            if path == "glossy_indirect" and SHOWN in frame.images:
-                level, shown = LEVEL_OF_REFLECTIONS, {"shown_sum": frame.images[SHOWN]}
+            shown, guide = {}, GUIDES_OF_LOBES.get(path)
+            if guide in frame.images:
+                level, shown = LEVEL_OF_REFLECTIONS, {"shown_sum": frame.images[guide]}
             tolerance = how.tolerance * frame.settings.get(self, "strength")
             for stride in how.strides:
                 constants = {"stride": stride, "tolerance": tolerance, "sharpness": how.sharpness}

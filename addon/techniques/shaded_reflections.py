@@ -43,7 +43,7 @@ from ..lighting.interfaces import clear_roughness
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import CANDIDATES
 from ..lighting.media import LightOfMedia, MediaService, Rays, dimmed
-from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
+from ..lighting.path_sources import SHOWN, SHOWN_THROUGH, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
 from ..materials.compiler import least_roughness, may_refract
@@ -152,13 +152,18 @@ def received_program(transmission: bool, soft_lobes: bool) -> Program:
     )  # fmt: skip
 
 
-GUIDE = passes.fullscreen_program(
-    "what reflections show",
-    "hits/guide.frag.glsl",
-    textures=(*SURFACE_TEXTURES, ("RGBA32F", "met_path")),
-    constants=(("FLOAT", "shaded_roughness"),),
-    outputs=(("VEC4", "out_shown"),),
-)
+@cache
+def guide_program(transmission: bool) -> Program:
+    return passes.fullscreen_program(
+        "what reflections show",
+        "hits/guide.frag.glsl",
+        textures=(*SURFACE_TEXTURES, ("RGBA32F", "met_path")),
+        constants=(("FLOAT", "shaded_roughness"),),
+        defines=(("TRANSMISSION", "1"),) if transmission else (),
+        outputs=(("VEC4", "out_shown"), *((("VEC4", "out_through"),) if transmission else ())),
+    )
+
+
 PROGRAMS = (
     *(scatter_program(onward) for onward in (False, True)),
     *(found_program(transmission) for transmission in (False, True)),
@@ -188,6 +193,7 @@ class ShadedReflections(Technique, BothWays):
             for order in ORDERS
         ),
         Write(SHOWN, "RGBA32F", "How much surfaces reflect that reflections show; its luminance squared", True),
+        Write(SHOWN_THROUGH, "RGBA32F", "The same of what is seen through glass", True, by_need=True),
         *(
             Write(f"radiance.transmission_{order}", "RGBA32F", f"Light through glass, {order}", True, by_need=True)
             for order in ORDERS
@@ -204,6 +210,7 @@ class ShadedReflections(Technique, BothWays):
         self._first_rays = 0.0
         self._turns, self._mirror_turns = Turns(self, MOST_PARTS), Turns(self, MOST_PARTS)  # of the ways of glass
         self._onward = True  # whether rays may go on from what they meet
+        self._guides: tuple[str, ...] = (SHOWN,)
         self._into: dict[str, images.Image] = {}  # what this bounce adds to, by name
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -231,7 +238,8 @@ class ShadedReflections(Technique, BothWays):
             self._onward = any(may_refract(one) or least_roughness(one) <= ONWARD_ROUGHNESS for one in graphs)
             if not self._onward:
                 frame.chose(self, "rays", f"1 bounce, because no material is smoother than {ONWARD_ROUGHNESS:g}")
-        guide = (SHOWN,) if frame.settings.samples > 1 else ()
+        self._guides = tuple(name for name in (SHOWN, SHOWN_THROUGH) if name in frame.images)
+        guide = self._guides if frame.settings.samples > 1 else ()
         for turns in (self._turns, self._mirror_turns):
             turns.begin(frame, (*_names(refracts(frame), ORDERS), *guide))
 
@@ -383,8 +391,8 @@ class ShadedReflections(Technique, BothWays):
     def _add_guide(self, frame, rays, records, closures, reach) -> None:
         if frame.settings.samples > 1:
             passes.fullscreen(
-                GUIDE,
-                images.Target((self._into[SHOWN],), records.target.depth),
+                guide_program(len(self._guides) > 1),
+                images.Target(tuple(self._into[name] for name in self._guides), records.target.depth),
                 blend="ADDITIVE_PREMULT",
                 where=MET,
                 textures={**closure_bindings(closures), "met_path": rays.colors[2]},

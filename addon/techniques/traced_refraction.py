@@ -42,7 +42,7 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.interfaces import clear_roughness, upload_interfaces
 from ..lighting.media import MediaService, dimmed
-from ..lighting.path_sources import PathSources, ShadedLobes
+from ..lighting.path_sources import SHOWN_THROUGH, PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -110,6 +110,7 @@ class TracedRefraction(Technique):
     writes = (
         Write("radiance.transmission_direct", "RGBA32F", "Light that arrives through one interface of glass", True),
         Write("radiance.transmission_indirect", "RGBA32F", "Light that arrives through glass from elsewhere", True),
+        Write(SHOWN_THROUGH, "RGBA32F", "What is seen through glass, as reflections show it", True),
     )
 
     def __init__(self):

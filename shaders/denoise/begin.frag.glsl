@@ -8,7 +8,7 @@
 
 vec3 without_color(vec3 light, ivec2 pixel)
 {
-#ifdef OF_MEDIA
+#if defined(OF_MEDIA) || defined(THROUGH_GLASS)
   return light;
 #else
   return light / max(color_sum_fetch(pixel).rgb / float(count), vec3(LEAST_COLOR));
@@ -36,7 +36,7 @@ void main()
   }
 #endif
   Shown here;
-#ifdef OF_MEDIA
+#if defined(OF_MEDIA) || defined(THROUGH_GLASS)
   bool colored = true;
 #else
   bool colored = max_component(color_sum_fetch(pixel).rgb) > LEAST_COLOR * float(count);

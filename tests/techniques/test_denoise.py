@@ -98,7 +98,7 @@ def test_light_paths_that_nothing_writes_are_not_filtered(stage):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("gloss", "passes"), [(False, 12), (True, 19)])
+@pytest.mark.parametrize(("gloss", "passes"), [(False, 12), (True, 23)])
 def test_glossy_indirect_light_is_filtered_where_something_is_glossy(stage, gloss, passes):
     stage.floor(material=stage.principled(Roughness=0.3) if gloss else stage.diffuse(0.7))
     stage.rectangle((-2, 0), (2, 2), location=(0, 2, 0), turn=(np.pi / 2, 0, 0), material=stage.diffuse(0.5))
@@ -133,6 +133,31 @@ def test_fireflies_of_glossy_indirect_light_are_spread_and_none_of_it_is_lost(st
     plain, filtered = (paths_of(stage, strength, 16, 2)["glossy_indirect"] for strength in (0.0, 1.0))
     assert filtered.mean() == pytest.approx(plain.mean(), rel=0.01)
     assert np.mean((filtered - truth) ** 2) < 0.6 * np.mean((plain - truth) ** 2)
+
+
+@pytest.mark.slow
+def test_what_glass_shows_is_filtered_and_none_of_it_is_lost(stage):
+    """A rough pane before a wall that a lamp lights: grain of the lobe goes, light stays."""
+    lit_room(stage, 0.1)
+    stage.rectangle((-2, -2), (2, 2), 1.0, material=stage.material("ShaderNodeBsdfGlass", Roughness=0.3, IOR=1.3))
+    results = [stage_light(stage, strength) for strength in (0.0, 1.0)]
+    plain, filtered = results
+    assert filtered.mean() == pytest.approx(plain.mean(), rel=0.02)
+    inner = np.s_[8:-8, 12:-12]
+    assert rough(filtered[inner]) < 0.9 * rough(plain[inner])
+
+
+def stage_light(stage, strength):
+    """Light through glass, (H, W)."""
+    stage.scene.candela.denoise_strength = strength
+    images = stage.render(4, SIZE, bounces=2)
+    light = images["transmission_direct"] + images["transmission_indirect"]
+    return (light * images["transmission_color"])[..., :3].mean(axis=-1)
+
+
+def rough(image):
+    """Mean square of what pixels differ by from the next."""
+    return np.mean(np.diff(image, axis=0) ** 2) + np.mean(np.diff(image, axis=1) ** 2)
 
 
 @pytest.mark.slow
