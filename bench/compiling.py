@@ -2,8 +2,8 @@
 
 Each scene is rendered with one sample in a process of its own, without the driver's cache (Mesa's; other drivers keep
 theirs). A program's seconds are processor time of all threads, to compile it and to draw with it for the first time:
-software drivers translate most of a program then. So a second picture of the same size, in which everything is compiled,
-stands beside the first.
+software drivers translate most of a program then. So a second picture of the same size, which
+compiles nothing, stands beside the first.
 
 Targets: 3 s for a Cornell box, 6 for a window, metals or skin, 15 for anything (processor seconds, first less second).
 """

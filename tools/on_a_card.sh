@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# What only a machine with a graphics card can tell, in one run of at most eight minutes: tools/on_a_card.sh OUT [PYTHON]
+# What only a machine with a graphics card can tell, in one run of at most eight minutes:
+# tools/on_a_card.sh OUT [PYTHON]
 #
-# OUT is a folder for logs, figures and docs/gpu.md's tables; PYTHON one with Blender as a module (default .venv's). Each
-# part has a limit of its own and leaves what it has; a part that fails does not stop the next ones. In order of worth:
+# OUT is a folder for logs, figures and docs/gpu.md's tables; PYTHON one with Blender as a module (default .venv's).
+# Each part has a limit of its own and leaves what it has; one that fails does not stop the next. In order of worth:
 #
 #   device    what Blender finds, in a line: a run on a software driver is stopped here unless SMALL=1
 #   gpu       bench gpu: four scenes at 1920x1080, each technique alone, fragment against compute, EEVEE beside
