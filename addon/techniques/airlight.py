@@ -58,7 +58,10 @@ from ..surfaces.draw import SURFACES
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
 COARSE = 2  # pixels of one known pixel's side then
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
-FEW_WORLD_DIRECTIONS = 8  # below FEW samples, where two are most of what the whole picture gets
+FEW_EMISSIVE_POINTS, FEW_WORLD_DIRECTIONS = (
+    16,
+    8,
+)  # below FEW samples, where two are most of what the whole picture gets
 AS_IN_CYCLES = -1  # bounces: as the scene has them there
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
 MOST_LAMPS = 16  # in a sample
@@ -300,10 +303,12 @@ class Airlight(Technique):
             sample = emitter.sample(*frame.random_volume("airlight/light"))
             rows.append(emitter.row(sample, 0, int(emitter.light.cast_shadow), weight))
         if self._triangles is not None:
-            for k in range(EMISSIVE_POINTS):
-                drawn = frame.random_volume_at(frame.sample * EMISSIVE_POINTS + k, "airlight/emissive")
-                samples = EMISSIVE_POINTS * frame.settings.samples
-                rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, lights.SHADOW_FLAG, 1, samples))
+            # A bulb shines to all sides, which few points on it do not.
+            count = FEW_EMISSIVE_POINTS if frame.settings.samples < FEW else EMISSIVE_POINTS
+            for k in range(count):
+                drawn = frame.random_volume_at(frame.sample * count + k, "airlight/emissive")
+                samples = count * frame.settings.samples
+                rows.append(self._triangles.row(drawn, count, lights.SHADOW_FLAG, 1, samples))
         if self._lit_by_world:
             count = world_directions(frame)
             for k in range(count):

@@ -5,7 +5,7 @@
 #include "media/asking.glsl"
 #include "media/view_ray.glsl"
 
-#define AROUND_PLACES 12  // around a lamp
+#define AROUND_PLACES 12  // around a lamp, fewer of each where there are many
 #define FAR_PLACES 2     // of lights at infinity
 
 void main()
@@ -21,13 +21,14 @@ void main()
   float begin = bins.from[0];
   float end = bins.to[bins.count - 1];
   vec3 sum = vec3(0.0);
+  int around_places = clamp(48 / max(light_count, 1) / 2 * 2, 4, AROUND_PLACES);
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
     bool round_ = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
     bool far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
-    for (int n = 0; n < (far ? FAR_PLACES : AROUND_PLACES); n++) {
+    for (int n = 0; n < (far ? FAR_PLACES : around_places); n++) {
       // Points that stand for all of the lamp; of a round one, at their mean distance from its middle.
-      float places = float(far ? FAR_PLACES : AROUND_PLACES);
+      float places = float(far ? FAR_PLACES : around_places);
       float v = (float(n) + 0.5) / places;
       vec2 u = vec2(fract(5.0 * v), fract(0.618034 * float(n)));
       Light part = light;
