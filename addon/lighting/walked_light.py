@@ -54,7 +54,7 @@ SMOOTH = passes.fullscreen_program(
         )
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "first_object"), ("FLOAT", "narrow")),
+    constants=(("INT", "first_object"), ("FLOAT", "narrowness")),
     defines=(("RANGE", str(RANGE)),),
     outputs=tuple(("VEC4", f"out_{name}") for name in NAMES),
 )  # fmt: skip
@@ -99,7 +99,7 @@ def walk(
             **{name: image for name, image in zip(PICTURE, picture) if name not in ("spread_entry", "scatter_walk")},
         },
         blocks={"film_view": frame.view_block},
-        constants={"first_object": points.first_object, "narrow": frame.settings.samples**-0.25},
+        constants={"first_object": points.first_object, "narrowness": frame.settings.samples**-0.25},
     )  # fmt: skip
     for image in made:
         images.pool.give(image)

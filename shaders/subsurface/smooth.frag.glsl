@@ -31,7 +31,7 @@ void main()
   vec3 face = octahedral_decode(normals.zw);
   float pixel_size = pixel_width_at(position);
   float range = window_of_walks(object_texel(first_object + OBJECT_TEXELS * (int(object) - 1)), pixel_size);
-  vec3 wide = max(narrow * min(PATHS * spread_length_fetch(pixel).xyz, vec3(WINDOWS * range)), vec3(PIXELS * narrow * pixel_size));
+  vec3 wide = max(narrowness * min(PATHS * spread_length_fetch(pixel).xyz, vec3(WINDOWS * range)), vec3(PIXELS * narrowness * pixel_size));
   float widest = max_component(wide);
   vec3 narrower = vec3(0.5) / (wide * wide) - vec3(0.5 / (widest * widest));
   vec3 tangent;
