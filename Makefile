@@ -102,6 +102,10 @@ bench-beside: environment ## before a submission: time and error beside an older
 bench-viewport: environment ## what edits cost in the viewport: times and uploads
 	$(PYTHON) -m bench.viewport
 
+pairs: environment ## every pair of features in one room beside Cycles, as far as it is not known yet: docs/pairs.md
+	$(PYTHON) -m bench pairs --alone
+	$(PYTHON) -m bench pairs --page
+
 clean: ## what was made here, except the environments
 	rm -rf build out .pytest_cache .hypothesis .ruff_cache
 	find addon tests bench sample_blends tools -name __pycache__ -prune -exec rm -rf {} +

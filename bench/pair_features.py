@@ -421,7 +421,12 @@ def depth_of_field(room):
 
 @feature
 def orthographic(room):
-    room.camera.data.type, room.camera.data.ortho_scale = "ORTHO", 4.4
+    camera = room.camera.data
+    camera.type, camera.ortho_scale = "ORTHO", 4.4
+    if camera.dof.use_dof:
+        camera.dof.aperture_fstop = (
+            3.0  # a lens as wide as the other: here it is 1 m / (2 N), whatever the focal length
+        )
 
 
 @feature

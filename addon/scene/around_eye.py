@@ -54,7 +54,8 @@ def _may_meet(origin: np.ndarray, direction: np.ndarray, low: np.ndarray, high: 
         ends = np.stack([(low - origin) / direction, (high - origin) / direction])
     ends = np.where(np.isnan(ends), np.array([[-np.inf], [np.inf]]), ends)
     enter, leave = ends.min(axis=0).max(), ends.max(axis=0).min()
-    return bool(leave >= max(enter, 0.0) - 1e-6 * abs(leave))
+    tolerance = 1e-6 * abs(leave) if np.isfinite(leave) else 0.0
+    return bool(np.isfinite(max(enter, 0.0)) and leave >= max(enter, 0.0) - tolerance)
 
 
 def _first_met(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> tuple[int, bool] | None:
