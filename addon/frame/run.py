@@ -91,7 +91,7 @@ class Renderer:
         watch = Stopwatch()
         context.ensure()
         context.begin_picture()
-        device_probe.ensure()
+        device_probe.ensure(measures=False)
         passes.left_out.clear()
         ledger = Ledger(samples=0)
         self.materials.update(snapshot)
@@ -100,6 +100,7 @@ class Renderer:
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
         yield 0, 0
+        device_probe.ensure()
         environment = self._update_environment(snapshot)
         self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
         plan = make_plan(self.techniques, snapshot, settings)

@@ -18,7 +18,7 @@ from ..frame.bands import Bands
 from ..frame.picture import Frame
 from ..frame.run import Renderer
 from ..frame.settings import Settings
-from ..gfx import images, library, passes
+from ..gfx import device, images, library, passes
 from ..scene.view import View
 from ..snapshot import SnapshotCache
 from ..snapshot.scene import Camera, Snapshot
@@ -375,6 +375,8 @@ class Viewport:
             begun.placed, begun.left = True, total - done
             if begun.why == CHECKS and total:  # no picture that stays as it is compiles anything
                 self._changed(begun, settings, clock)
+            if not device.known():  # it is measured next, which takes a second: a first look comes before
+                return False
             if library.news() != known and clock() - called > BUDGET_S:
                 return False
         return library.news() == known or clock() - called <= BUDGET_S

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from addon import viewport
-from addon.gfx import images, library
+from addon.frame import device_probe
+from addon.gfx import device, images, library
 from addon.scene.view import View
 from addon.surfaces.first_look import HEADLIGHT, FirstLook
 from addon.ui import ENGINE
@@ -134,3 +135,19 @@ def test_what_lets_pass_hides_every_other_pixel_and_guides_by_its_shape_if_it_ha
     looked.release()
     assert 0.01 < covered[False] < 0.6
     assert covered[True] == pytest.approx(2.0 * covered[False] * guides, rel=0.1, abs=1e-6)
+
+
+def test_first_look_comes_before_a_device_is_measured(cold, monkeypatch):
+    measured, figures = [], device.current()
+    monkeypatch.setattr(device, "given", lambda: None)
+    monkeypatch.setattr(device, "read", lambda folder: None)
+    monkeypatch.setattr(device, "write", lambda folder, found: None)
+    monkeypatch.setattr(device_probe, "measure", lambda: measured.append(True) or figures)
+    device.use(None)
+    try:
+        cold.draw()
+        assert cold.viewport.looks and not measured
+        cold.draw()
+        assert measured == [True] and device.known()
+    finally:
+        device.use(figures)
