@@ -13,6 +13,7 @@ from tests.techniques.foggy_stage import box
 
 COLOR = (0.8, 0.5, 0.2)
 PATH = 0.25 / np.pi  # of a radius: Burley's d
+WALK = 1.0 if bpy.app.version >= (5, 2) else 1.0 / PATH  # by what Random Walk's radii are free paths
 
 
 def scattering(stage, method="BURLEY", scale=1.0, radius=(1, 1, 1), color=COLOR, weight=1.0):
@@ -386,7 +387,7 @@ def walked_through(paths, albedo, walks=200_000):
 @pytest.mark.parametrize("paths", [0.5, 3.0])
 @pytest.mark.parametrize("behind", [True, False])
 def test_walks_through_a_slab_are_plain_walks(stage, paths, behind):
-    material = scattering(stage, "RANDOM_WALK", 0.1, color=(0.8, 0.8, 0.8))
+    material = scattering(stage, "RANDOM_WALK", 0.1 * WALK, color=(0.8, 0.8, 0.8))
     material.node_tree.nodes[0].inputs["Roughness"].default_value = 0.0
     stage.rectangle((-3, -3), (3, 3), material=material)
     stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1 * paths
@@ -398,14 +399,14 @@ def test_walks_through_a_slab_are_plain_walks(stage, paths, behind):
 
 
 def test_walks_in_a_white_body_under_an_even_world_lose_nothing(stage):
-    sphere(stage, scattering(stage, "RANDOM_WALK", 0.3, color=(1, 1, 1)), radius=1.0)
+    sphere(stage, scattering(stage, "RANDOM_WALK", 0.3 * WALK, color=(1, 1, 1)), radius=1.0)
     stage.world((1, 1, 1))
     stage.camera_above(0.5, 5.0)
     assert shown(stage.render(4, size=(24, 24))).mean() == pytest.approx(1.0, abs=0.03)
 
 
 def test_walks_light_a_ball_from_behind_as_in_cycles(stage):
-    sphere(stage, scattering(stage, "RANDOM_WALK", 0.4, radius=(1, 0.6, 0.3)), radius=1.0)
+    sphere(stage, scattering(stage, "RANDOM_WALK", 0.4 * WALK, radius=(1, 0.6, 0.3)), radius=1.0)
     stage.light("SUN", turn=(2.4, 0, 0), energy=np.pi, angle=0.1)
     stage.camera_above(0.9, 5.0)
     cycles = shown(stage.render(128, size=(24, 24), engine="CYCLES")).mean(axis=(0, 1))
@@ -414,7 +415,7 @@ def test_walks_light_a_ball_from_behind_as_in_cycles(stage):
 
 @pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
 def test_what_is_painted_opaque_lets_no_light_through(stage, method):
-    material = scattering(stage, method, 0.1 if method == "RANDOM_WALK" else 1.0)
+    material = scattering(stage, method, 0.1 * WALK if method == "RANDOM_WALK" else 1.0)
     card = stage.card(material, 0.0, 1.0)
     card.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.05
     mask = _map("opaque on the right", lambda u: (float(u < 0.5),) * 3)
