@@ -19,6 +19,7 @@ import numpy as np
 from .exr import ExrError, read_exr
 
 FIRST_TILE = 1001  # UDIM
+MOST_AT_ONCE = 1 << 23  # numbers of an image that are summed in double precision at a time
 
 
 def frame_of(user, frame: int) -> int:
@@ -80,6 +81,31 @@ def read_layer(path: str, layer: int, number: int) -> np.ndarray | str:
     if not 0 <= layer < len(every) or not 0 <= number < len(every[layer]):
         return "the layer or pass that a node shows is not in the file; it is drawn magenta."
     return found[every[layer][number]]
+
+
+def scaled(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
+    """(height, width, channels) float32 of an image (H, W, channels) that is at least as large: each pixel is the mean
+    of what it covers, of the numbers as they are stored."""
+    return _means(_means(pixels, width, 1), height, 0)
+
+
+def _means(pixels: np.ndarray, count: int, axis: int) -> np.ndarray:
+    """`count` means along an axis."""
+    length = pixels.shape[axis]
+    if count == length:
+        return pixels
+    edges = np.linspace(0.0, length, count + 1)
+    whole = np.minimum(np.floor(edges).astype(int), length - 1)
+    share = (edges - whole).reshape(-1, *(1 for _ in range(pixels.ndim - 1)))
+    other = 1 - axis
+    made = np.empty([count if k == axis else size for k, size in enumerate(pixels.shape)], np.float32)
+    step = max(1, MOST_AT_ONCE // (length * pixels.shape[2]))
+    for first in range(0, pixels.shape[other], step):
+        part = np.moveaxis(pixels[(slice(None),) * other + (slice(first, first + step),)], axis, 0).astype(np.float64)
+        sums = np.concatenate([np.zeros_like(part[:1]), np.cumsum(part, axis=0)])
+        means = np.diff(sums[whole] + share * part[whole], axis=0) * (count / length)
+        made[(slice(None),) * other + (slice(first, first + step),)] = np.moveaxis(means, 0, axis)
+    return made
 
 
 def to_scene_linear(pixels: np.ndarray, space: str) -> np.ndarray:

@@ -17,12 +17,12 @@ import bpy
 import numpy as np
 
 from ..materials import working_space
-from ..materials.atlas import layout, packed
+from ..materials.atlas import WIDEST, layout, packed
 from ..materials.estimate import srgb_decode
 from ..materials.ies import Profile, profile_pixels
 from ..materials.sky import Sky, working_sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
-from .image_files import frame_of, read_file, read_layer, sequence_path, tile_path, to_scene_linear
+from .image_files import frame_of, read_file, read_layer, scaled, sequence_path, tile_path, to_scene_linear
 from .scene import Image, Note
 
 # Byte images in these colour spaces need no decoding; sRGB is decoded after filtering, as in Cycles.
@@ -177,7 +177,7 @@ def _pixels(original, part: Part) -> tuple[np.ndarray, tuple, bool, tuple[Note, 
     subject = f"Image '{original.name}'"
     space, tiles = original.colorspace_settings.name, ()
     text = "the image is missing or cannot be read and is drawn magenta; check its file path."
-    found = None
+    found, notes = None, ()
     if isinstance(part, OfSequence):
         found = read_file(sequence_path(_path(original), part.frame), space)
         text = f"frame {part.frame} of the sequence is missing and is drawn magenta; check its file path."
@@ -192,6 +192,7 @@ def _pixels(original, part: Part) -> tuple[np.ndarray, tuple, bool, tuple[Note, 
         parts = [(number, _tile(original, number, space)) for number in numbers]
         parts = [(number, _four_channels(pixels)) for number, pixels in parts if pixels is not None]
         if parts:
+            parts, notes = _tiles_that_fit(parts, subject)
             corners, _ = layout([(pixels.shape[1], pixels.shape[0]) for _, pixels in parts])
             tiles = tuple(
                 (number, *corner, pixels.shape[1], pixels.shape[0]) for (number, pixels), corner in zip(parts, corners)
@@ -207,7 +208,28 @@ def _pixels(original, part: Part) -> tuple[np.ndarray, tuple, bool, tuple[Note, 
         found = _own_pixels(original) if found is None else found
     if found is None or not found.size:
         return np.array([[MAGENTA]], np.float32), (), True, (Note(subject, text),)
-    return _four_channels(found), tiles, False, ()
+    height, width = found.shape[:2]
+    if max(width, height) > WIDEST:
+        size = min(width, WIDEST), min(height, WIDEST)
+        limit, made = f"{width} x {height} pixels are more than GPUs take, {WIDEST} a side", f"{size[0]} x {size[1]}"
+        text = f"its {limit}; it is scaled to {made}."
+        found, notes = scaled(found, *size), (Note(subject, text),)
+    return _four_channels(found), tiles, False, notes
+
+
+def _tiles_that_fit(parts: list[tuple[int, np.ndarray]], subject: str) -> tuple[list, tuple[Note, ...]]:
+    """Tiles (number, pixels) that fit into one image of WIDEST pixels a side, and what is to be said of that."""
+    halvings, sizes = 0, [pixels.shape[1::-1] for _, pixels in parts]
+    while max(layout(sizes)[1]) > WIDEST:
+        halvings += 1
+        sizes = [(max(width // 2, 1), max(height // 2, 1)) for width, height in sizes]
+    if not halvings:
+        return parts, ()
+    parts = [(number, scaled(pixels, *size)) for (number, pixels), size in zip(parts, sizes, strict=True)]
+    text = (
+        f"its tiles are more than GPUs take in one image; they are scaled to 1/{2**halvings} of their width and height."
+    )
+    return parts, (Note(subject, text),)
 
 
 def _tile(original, number: int, space: str) -> np.ndarray | None:

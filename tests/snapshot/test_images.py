@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.snapshot import SnapshotCache
+from addon.materials import atlas
+from addon.snapshot import SnapshotCache, images
 
 
 def shown(stage, image):
@@ -263,3 +264,28 @@ def test_a_painted_image_that_is_saved_is_not_read_again(stage, tmp_path):
     state = next(iter(cache.images.values())).state
     assert only_image(stage.take(cache)) is only_image(before)
     assert next(iter(cache.images.values())).state is state
+
+
+def test_what_is_larger_than_gpus_take_is_scaled_with_a_warning(stage, monkeypatch):
+    monkeypatch.setattr(images, "WIDEST", 8)
+    image, values = generated(20, 4, float_buffer=True)
+    shown(stage, image)
+    snapshot = stage.take()
+    taken = only_image(snapshot).pixels
+    assert taken.shape == (4, 8, 4)
+    # A pixel is the mean of two and a half: of the first two whole ones and half of the third.
+    expected = (values[:, 0] + values[:, 1] + 0.5 * values[:, 2]) / 2.5
+    np.testing.assert_allclose(taken[:, 0], expected, atol=1e-5)
+    np.testing.assert_allclose(taken.mean(axis=1), values.mean(axis=1), atol=1e-5)
+    assert any("'made': its 20 x 4 pixels" in str(note) for note in snapshot.notes)
+
+
+def test_tiles_are_scaled_until_they_fit(monkeypatch):
+    monkeypatch.setattr(images, "WIDEST", 8)
+    monkeypatch.setattr(atlas, "WIDEST", 8)
+    tiles = [(1001 + k, np.full((8, 8, 4), float(k), np.float32)) for k in range(3)]
+    scaled, notes = images._tiles_that_fit(tiles, "Image 'made'")
+    assert [(number, pixels.shape, pixels.mean()) for number, pixels in scaled] == [
+        (1001 + k, (4, 4, 4), float(k)) for k in range(3)
+    ]
+    assert "1/2 of their width" in str(notes[0])
