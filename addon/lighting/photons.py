@@ -112,6 +112,7 @@ class LitView:
     index: int  # how many points of this light have had photons before
     count: int  # how many points of it the picture has, or has had up to now
     weight: float  # of the point's photons: they stand for the samples that have none
+    even: bool = True  # all points have known the same count: choices at interfaces may be shared out over them
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ class Photons:
                 shift = frame.random_at(number, "caustics/grid")
                 for low, high in boxes:
                     for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):
-                        yield LitView(emitter, sample, view, lobes, number, count * parts, weight / parts)
+                        yield LitView(emitter, sample, view, lobes, number, count * parts, weight / parts, turn is None)
 
     def _rounds(self, frame: Frame, casters: caustic_casters.Casters) -> tuple[list[lights.Emitter], int]:
         """The lights that are answered for, and how many samples have photons of all of them. Where many lights see
@@ -254,13 +255,13 @@ class Photons:
         share = float(count) ** -0.5
         wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
         u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
-        strata = float(count) if frame.settings.whole and count > 1 else 0.0
+        strata = float(count) if frame.settings.whole and light.even and count > 1 else 0.0
         if count == 1:
             u, later, strata = (0.5, 0.5), (0.5, 0.5), -1.0
         parts = self._parts if count < FEW else 1  # of several lobes each by itself: one alone would tint all
         sources = self._sources.set([emitter.row(light.sample, 0, 0, light.weight / parts)])
         choice = frame.random_volume_at(light.index, "caustics/interface")[2]
-        if parts > 1 and frame.settings.whole:
+        if parts > 1 and frame.settings.whole and light.even:
             choice = (light.index % count + 0.5) / count
         drawn = (
             one

@@ -509,6 +509,18 @@ def rings(energy, span, edges):
 
 
 @pytest.mark.slow
+def test_a_caustic_that_few_samples_draw_has_all_of_its_light(stage):
+    """From eight samples on photons come in as many as they are worth: no more light than where every sample has them,
+    though inner faces choose for all photons of a sample whether they mirror."""
+    stage.floor()
+    stage.light("POINT", (0, 0, 3), energy=300, shadow_soft_size=0.05)
+    ball(stage, glass(stage, Color=(0.5, 0.5, 0.5, 1.0)), radius=0.3, place=(0, 0, 0.5), segments=48)
+    stage.camera_above(3.0)
+    few, many = (irradiance(stage, PHOTONS, samples=samples, size=(48, 48)).mean() for samples in (4, 16))
+    assert many == pytest.approx(few, rel=0.05)
+
+
+@pytest.mark.slow
 def test_a_softbox_has_its_caustic_and_the_glass_its_shadow(stage):
     """A lamp of 1 m, 1 m above a glass ball: as wide as it is far."""
     stage.floor()
