@@ -40,7 +40,7 @@ from .technique import Technique
 TILE = 16  # pixels
 FEWEST_SAMPLES = 8
 LITTLE = 1e-5  # S of what need not be seen to be as large in both halves of the samples
-WHOLE = 0.06  # S from which a part is drawn in each sample: the relative squared error of a whole picture's sample
+WHOLE = 0.2  # S from which a part is drawn in each sample: the relative squared error of a whole picture's sample
 
 
 @cache
