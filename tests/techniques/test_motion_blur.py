@@ -310,6 +310,8 @@ def test_a_velocity_stands_for_motion(blurred, kind):
         card.data.attributes.new("velocity", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", [48.0, 0, 0] * 4)
     else:
         cloud = bpy.data.pointclouds.new("points")
+        if not hasattr(cloud, "resize"):
+            pytest.skip("this Blender fills point clouds by geometry nodes alone")
         cloud.resize(1)
         for name, type_name in (("radius", "FLOAT"), ("velocity", "FLOAT_VECTOR")):
             if name not in cloud.attributes:
