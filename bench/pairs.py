@@ -224,11 +224,16 @@ def worst(known: dict[str, dict[str, dict]], most: int = 20) -> list[list[str]]:
 
 def write_page(known: dict[str, dict[str, dict]]) -> None:
     """The page's tables and its picture, of all pairs that are known."""
-    pairs = {names: found for names, found in known.items() if names.count(" + ") == 1}
+    alone, pairs = ({names: found for names, found in known.items() if names.count(" + ") == n} for n in (0, 1))
     draw(pairs)
     if not PAGE.exists():
         write_whole(PAGE, f"# Features that meet\n\n{begin(COMMAND)}\n<!-- end of what is written -->\n")
-    text = f"{table(summary(pairs))}\n\n![Pairs of features](images/{PICTURE.name})\n\n{table(worst(pairs, 30))}"
+    every = len(FEATURES) * (len(FEATURES) - 1) // 2
+    text = (
+        f"Features alone:\n\n{table(summary(alone))}\n\n{table(worst(alone))}\n\n"
+        f"{len(pairs)} of {every} pairs:\n\n{table(summary(pairs))}\n\n"
+        f"![Pairs of features](images/{PICTURE.name})\n\n{table(worst(pairs, 30))}"
+    )
     put_between(PAGE, COMMAND, text)
 
 
