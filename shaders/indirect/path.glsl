@@ -230,6 +230,8 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
   vec3 position = met.position;
   vec3 normal = met.turned;
   vec3 origin = ray_origin(position, met.lit);
+  vec3 off = normal - met.lit;
+  float bump = (dot(off, off) > 1e-10) ? bump_squared(met.lit, normal) : 0.0;
   vec3 sum = vec3(0.0);
   uint roll = salt;
   for (int group = 0; group < min(light_rays, light_count); group++) {
@@ -246,7 +248,9 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       }
 #endif
       vec3 arriving = unblocked_irradiance(light_read(i), position, normal, direction);
-      arriving *= (dot(direction, met.lit) > 0.0) ? 1.0 : 0.0;
+      float above = dot(direction, met.lit);
+      // Bumps shadow themselves, as bump_shadowing of lib/brdf.glsl says of what the camera sees.
+      arriving *= (above > 0.0) ? ((bump > 0.0) ? bump_dimming(bump, max(above, 1e-6)) : 1.0) : 0.0;
       float share = luminance(abs(arriving));
       total += share;
       if (draw_passing(share, total, roll)) {
