@@ -70,6 +70,9 @@ def flush_program(names: tuple[str, ...]) -> Program:
     )
 
 
+DECLARED = square_program(2), flush_program(("first", "second"))
+
+
 def apart_by(share: float, samples: int) -> int:
     """Samples from one turn to the next for a part of this S: a power of two."""
     most = most_apart(samples, FEWEST if share > LITTLE else 1)

@@ -127,6 +127,12 @@ def surfaces_program(shining: bool) -> Program:
     )  # fmt: skip
 
 
+DECLARED = (
+    *(walks_program(start, -1, start == CELLS, start != PIXELS, start == ON_SURFACES) for start in START),
+    *(program(shining) for program in (cells_program, surfaces_program) for shining in (False, True)),
+)
+
+
 class MediaBounces:
     """What walks find in a sample, added to the frame's radiance."""
 

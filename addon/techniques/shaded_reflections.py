@@ -169,6 +169,7 @@ PROGRAMS = (
     *(found_program(transmission) for transmission in (False, True)),
     *(received_program(True, soft) for soft in (False, True)),
 )
+DECLARED = guide_program(False), guide_program(True)
 
 
 class ShadedReflections(Technique, BothWays):

@@ -119,5 +119,5 @@ def test_light_of_instances_has_the_colours_of_their_attributes(stage, beside):
         one["tone"], one.visible_camera = tone, False
     stage.floor()
     stage.camera_above()
-    own, cycles = (one["combined"][..., :3].reshape(4, 8, 4, 8, 3).mean((1, 3)) for one in beside(16, (32, 32), 0, 128))
+    own, cycles = (one["combined"][..., :3].reshape(4, 8, 4, 8, 3).mean((1, 3)) for one in beside(64, (32, 32), 0, 128))
     agree(own, cycles)

@@ -11,6 +11,7 @@ from addon.gfx.interface import answered
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
 from addon.lighting.grass import GRASS
+from addon.lighting.linked import LINKS
 from addon.lighting.loop import lighting
 from addon.lighting.visibility import HARD
 from addon.materials import nodes
@@ -78,6 +79,7 @@ def programs() -> list[Program]:
     made += [materials._lobe_program(plain), hit_program(plain), media.bake_program(fog(), ("density",))]
     made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
     made += [grass_program(materials._surface_program(plain)), answered(lighting(HARD, False), (GRASS,))]
+    made += [answered(lighting(HARD, False), (LINKS,))]
     made += relief_programs()
     layouts = ((("UV", "VECTOR"),), (("", "COLOR"), ("", "VALUE")))
     made += [lamp_program(plain), *(materials._aov_program(plain, (held,)) for held in layouts)]
