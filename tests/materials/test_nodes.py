@@ -160,6 +160,27 @@ def test_principled_alpha_emission_and_holdout(evaluate):
     assert evaluate(compile_material("Test", hold))["holdout"][0] == pytest.approx(1.0)
 
 
+def test_hair_absorbs_along_the_mean_chord_of_its_fibre(evaluate):
+    """Lines that meet a circle of radius 1 at an even distance from its middle cross it by pi / 2 in the mean."""
+    apart = (np.arange(4096) + 0.5) / 4096
+    chord = np.mean(2 * np.sqrt(1 - apart**2))
+    hair = node(
+        "Hair", "ShaderNodeBsdfHairPrincipled", {"BSDF": "SHADER"}, properties={"parametrization": "ABSORPTION"},
+        Absorption_Coefficient=(0.25, 0.5, 1.4),
+    )  # fmt: skip
+    bare = node(
+        "Hair", "ShaderNodeBsdfHairPrincipled", {"BSDF": "SHADER"}, properties={"parametrization": "ABSORPTION"},
+        Absorption_Coefficient=(0.0, 0.0, 1e6),
+    )  # fmt: skip
+    albedo = [
+        2 * evaluate(compile_material("Test", graph(one, surface=("Hair", "BSDF"))))["diffuse"][0]
+        for one in (hair, bare)
+    ]
+    mirrored = albedo[1][2]
+    passed = (albedo[0] - mirrored) / (albedo[1][0] - mirrored)
+    np.testing.assert_allclose(passed, np.exp(-chord * np.array([0.25, 0.5, 1.4])), rtol=3e-3)
+
+
 def test_a_color_as_surface_glows(evaluate):
     tree = graph(node("Paint", "ShaderNodeRGB", {"Color": "COLOR"}, Color=(0.2, 0.5, 0.8, 1.0)),
                  surface=("Paint", "Color"))  # fmt: skip

@@ -47,3 +47,14 @@ def test_light_that_a_half_space_returns_is_chandrasekhars(gpu_context, albedo):
     apart = found[1:, 0] - (1 - absorption * exact)
     print(f"mean {apart.mean():.5f}, most {np.abs(apart).max():.5f}")
     assert abs((2 * cosine * apart).mean()) < 1e-3 and np.abs(apart).max() < 6e-3
+
+
+@pytest.mark.parametrize("aspect", [1.0, 4.0])
+def test_the_level_of_an_image_has_texels_as_wide_as_the_footprint_is_across(gpu_context, aspect):
+    """log2 of the footprint's narrower side in texels, averaged by as many lookups as it is longer than wide."""
+    side = 256
+    footprint = f"mat2({aspect} * (1.0 + 31.0 * k) / {side}.0, 0.0, 0.0, (1.0 + 31.0 * k) / {side}.0)"
+    probes = f"image_probes({footprint}, ivec2({side}), IMAGE_LEVELS)"
+    found = evaluated("material/image.glsl", f"vec4({probes}.mip, float({probes}.count), k, 0.0)")
+    np.testing.assert_allclose(found[:, 0], np.log2(1 + 31 * found[:, 2]), atol=1e-3)
+    np.testing.assert_array_equal(found[:, 1], aspect)

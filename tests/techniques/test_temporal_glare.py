@@ -65,6 +65,11 @@ def test_the_picture_is_the_convolution_by_numpy_of_the_linear_picture(night, re
         lens = optics.glare(images["combined"].astype(np.float64), expected, 1.0, 1.0, 1e6)
         error = np.sqrt(np.mean((images["glare"][..., :3] - lens) ** 2) / np.mean(lens**2))
         assert error < 1e-3
+        dark = images["combined"][..., :3].max(axis=-1) < 1.0  # what scatters is little beside the lamps themselves
+        scattered, expected = (
+            image[dark] - images["combined"][dark][:, :3] for image in (images["glare"][..., :3], lens)
+        )
+        assert scattered.sum() == pytest.approx(expected.sum(), rel=3e-3)
     else:
         total = images["combined"][..., :3].sum()
         assert images["glare"][..., :3].sum() == pytest.approx(total, rel=0.05)  # some leaves at the borders
