@@ -79,9 +79,11 @@ class PathSources:
             chosen = chosen.astype(int)
         for number in chosen:
             emitter = self._emitters[number]
-            sample = emitter.sample(*frame.random_volume(f"{self.use}/light"))
+            narrow, drawn = emitter.is_narrow(frame.receivers), frame.random_volume(f"{self.use}/light")
+            sample = emitter.narrow_sample(*drawn[:2]) if narrow else emitter.sample(*drawn)
             weight = max(count / self.most_lamps, 1.0)
             row = emitter.row(sample, 0, int(emitter.light.cast_shadow), weight)
+            row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
             row[lights.LIGHT.at.flags] += lights.GLASS_BLOCKS_FLAG * (emitter.light.key in by_photons)
             rows.append(row)
         if self._triangles is not None:

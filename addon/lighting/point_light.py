@@ -111,12 +111,15 @@ class PointLight:
             picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
             chosen = [(emitters[k], 1.0 / chance[k]) for k in picked]
         for emitter, weight in chosen:
-            each = self._points(frame, 1) if emitter.extended else 1
+            each, narrow = self._points(frame, 1) if emitter.extended else 1, emitter.is_narrow(frame.receivers)
             for number in range(sample_number * each, (sample_number + 1) * each):
-                sample = emitter.sample(*frame.random_volume_at(number, f"{self._use}/light"))
+                drawn = frame.random_volume_at(number, f"{self._use}/light")
+                sample = emitter.narrow_sample(*drawn[:2]) if narrow else emitter.sample(*drawn)
                 points = self._sharpness * each * settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
-                yield emitter.row(sample, 0, shadowed, weight, each, points)
+                row = emitter.row(sample, 0, shadowed, weight, each, points)
+                row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
+                yield row
 
     def _world(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
         world = frame.snapshot.world

@@ -300,11 +300,14 @@ class VirtualLights:
         for emitter, weight in chosen:
             # A light without extent is one point however often it is drawn.
             points = each if emitter.has_span or emitter.radius > 0 else 1
+            narrow = emitter.is_narrow(frame.receivers)
             for k in range(points):
-                sample = emitter.sample(*frame.random_volume_at(frame.sample * points + k, "virtual lights/light"))
+                drawn = frame.random_volume_at(frame.sample * points + k, "virtual lights/light")
+                sample = emitter.narrow_sample(*drawn[:2]) if narrow else emitter.sample(*drawn)
                 total = points * frame.settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
                 row = emitter.row(sample, 0, shadowed, weight / points, points=total)
+                row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
                 row[lights.LIGHT.at.flags] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
                 row[lights.LIGHT.at.first_view] = lights.passing_bits(emitter.light.links.passing)
                 rows.append(row)

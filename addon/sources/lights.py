@@ -43,9 +43,10 @@ LIGHT = Record(
         "SIDED",  # of a point on a surface: it shines only to where its normal points
         "EVEN",  # of a world of one colour
         "GLASS_BLOCKS",  # what passes glass arrives as photons of caustics
+        "NARROW",  # `point` is a direction within its spread, not a place on it
         "MAPPED",  # its node tree varies; the bits above are the number of its map (lamp_maps.py)
     ),
-    constants={"MAP_SHIFT": 13, "AS_A_WHOLE": 8},
+    constants={"MAP_SHIFT": 14, "AS_A_WHOLE": 8},
 )  # fmt: skip
 TEXELS = LIGHT.texels
 VIEW_TEXELS = 5
@@ -59,12 +60,13 @@ LAMPS = sum(1 << kind for kind in (POINT, SPHERE, SUN, RECTANGLE, ELLIPSE))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
 BRIGHTEST = 1e30  # W / (m2 sr): a light that would be brighter at its size counts as larger, or as a point
+LEAST_SPREAD = np.radians(1.0)  # as in Cycles, which lets no area light be narrower
 NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its inverse may not fit
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = (
     LIGHT.flags[name] for name in ("DIFFUSE", "GLOSSY", "SHADOW", "SPOT", "CAMERA", "TRACED", "WHOLE")
 )
-NEAR_FLAG, TRANSMISSION_FLAG, SIDED_FLAG, EVEN_FLAG, GLASS_BLOCKS_FLAG, MAPPED_FLAG = (
-    LIGHT.flags[name] for name in ("NEAR", "TRANSMISSION", "SIDED", "EVEN", "GLASS_BLOCKS", "MAPPED")
+NEAR_FLAG, TRANSMISSION_FLAG, SIDED_FLAG, EVEN_FLAG, GLASS_BLOCKS_FLAG, NARROW_FLAG, MAPPED_FLAG = (
+    LIGHT.flags[name] for name in ("NEAR", "TRANSMISSION", "SIDED", "EVEN", "GLASS_BLOCKS", "NARROW", "MAPPED")
 )
 KIND_STEPS = 16  # in the steps of a row's `kind` stand the groups of receivers that a light does not light, 12 bits
 MAP_SHIFT = LIGHT.constants["MAP_SHIFT"]
@@ -114,6 +116,21 @@ class Emitter:
             return self.centre + (2 * x - 1) * self.u[:3] + (2 * y - 1) * self.v[:3]
         radius, turn = np.sqrt(x), 2 * np.pi * y
         return self.centre + radius * (np.cos(turn) * self.u[:3] + np.sin(turn) * self.v[:3])
+
+    def is_narrow(self, receivers) -> bool:
+        """Whether its spread lets most of scene.receivers.Receivers (or None) see only a part of it."""
+        if not (self.has_span and self.spread > 0.0) or receivers is None or not len(receivers.distance):
+            return False
+        distance = np.median(np.linalg.norm((receivers.low + receivers.high) / 2 - self.centre, axis=1))
+        return bool(np.pi * (self.spread * distance) ** 2 < self.area)
+
+    def narrow_sample(self, x: float, y: float) -> np.ndarray:
+        """In place of `sample`, for rows with NARROW_FLAG: a unit vector towards the light, drawn as it shines."""
+        u, v = _beside(np.asarray(self.axis, np.float64).tobytes())
+        # The tangent r of the angle has density r (h - r): inverse of 3 x^2 - 2 x^3.
+        tangent = self.spread * (0.5 - np.sin(np.arcsin(1.0 - 2.0 * x) / 3.0))
+        turn = 2.0 * np.pi * y
+        return _unit(tangent * (np.cos(turn) * u + np.sin(turn) * v) - self.axis)
 
     def part(self, x: float, y: float, count: int) -> Emitter | None:
         """The one of `count` alike parts, as square as can be, that holds the point (x, y) of the unit square.
@@ -244,7 +261,7 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
             return None
         area = max(area, smallest**2)
         radiance = strength / np.pi / (area if light.normalize else 1.0)
-        spread = 0.0 if light.spread >= np.pi - 1e-6 else float(np.tan(max(light.spread, 2e-4) / 2))
+        spread = 0.0 if light.spread >= np.pi - 1e-6 else float(np.tan(max(light.spread, LEAST_SPREAD) / 2))
         kind = ELLIPSE if light.shape == "ELLIPSE" else RECTANGLE
         return Emitter(
             light, kind, flags, centre, 0.0, radiance, area, axis, spread, u * width / 2, v * height / 2, zero

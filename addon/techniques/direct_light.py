@@ -101,10 +101,11 @@ class DirectLight(Technique):
             provider = service.serving(emitter) if service else self._unshadowed
             rate = self._rate(frame, emitter, weight, provider)
             points = rate.per_sample * frame.settings.samples / weight
+            narrow = emitter.is_narrow(frame.receivers) and not acceleration.too_many(frame.snapshot)
             among = self._blockers(frame, emitter) if service else None
             if among is not None:
                 provider = among
-            elif service and self._has_rays(frame, emitter, provider):
+            elif service and (narrow or self._has_rays(frame, emitter, provider)):
                 provider = self._rays
             flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
             flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
@@ -113,13 +114,16 @@ class DirectLight(Technique):
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
                 cell = 1.0 if part else provider.cell(frame, number, points)
                 whole = cell >= 1.0 and emitter.extended and emitter.maps is None
+                drawn = frame.random_volume_at(number, "light")
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
-                sample = shown.middle() if whole else shown.sample(*frame.random_volume_at(number, "light"))
+                sample = shown.middle() if whole else shown.sample(*drawn)
                 near = bool(service) and provider.asks_views and cell == 0.0 and emitter.light.key in self._near
                 views = provider.views(frame, shown, sample, number, cell)
                 asked = len(views) or near or not provider.asks_views
+                sample = shown.narrow_sample(*drawn[:2]) if narrow else sample
                 row = shown.row(sample, 0, asked, weight, rate.per_sample * share, points * share)
                 row[lights.LIGHT.at.flags] += lights.WHOLE_FLAG * whole + flags + lights.NEAR_FLAG * near
+                row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
                 found.append(LightPoint(row, provider, views))
         return found
 

@@ -184,7 +184,8 @@ vec3 unblocked_irradiance(Light light, vec3 position, vec3 normal, out vec3 dire
 // aimed at anew: from the ray's origin, which is beside the surface, it would meet an emissive triangle a little too soon.
 float light_reach(Light light, vec3 origin, inout vec3 direction)
 {
-  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
+  bool has_point = (light.flags & LIGHT_NARROW) == 0;
+  if ((has_point && (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE)) || light.kind == LIGHT_SURFACE) {
     vec3 path = light.point - origin;
     float reach = max(length(path), 1e-30);
     direction = path / reach;

@@ -59,6 +59,40 @@ float spread_attenuation(float tan_half, float cos_light)
   return max(tan_half - tan_theta, 0.0) / normalisation;
 }
 
+// Where a ray from `position` towards the light meets the plane of an area light: distance, and place on it.
+float light_plane(Light light, vec3 position, vec3 direction, out vec2 place)
+{
+  float t = dot(position - light.centre, light.axis) / max(-dot(direction, light.axis), 1e-6);
+  vec3 offset = position + t * direction - light.centre;
+  vec3 u = light_u(light);
+  vec3 v = light_v(light);
+  place = vec2(dot(offset, u) / max(dot(u, u), 1e-30), dot(offset, v) / max(dot(v, v), 1e-30));
+  return t;
+}
+
+bool light_has_place(Light light, vec2 place)
+{
+  return (LIGHT_IS(light, LIGHT_RECTANGLE) ? max(abs(place.x), abs(place.y)) : length(place)) <= 1.0;
+}
+
+// The same of an area light that shines into a narrow cone: the direction is shared, and the point differs (LIGHT_NARROW).
+vec3 light_sample_narrow(Light light, vec3 position, out vec3 direction, out float density)
+{
+  direction = light.point;
+  vec2 place;
+  float t = light_plane(light, position, direction, place);
+  float cos_light = -dot(direction, light.axis);
+  density = t * t / max(light.area * cos_light, 1e-30);  // as in light_hit
+  if (t <= 0.0 || !light_has_place(light, place)) {
+    return vec3(0.0);
+  }
+  // Drawn in proportion to the spread's attenuation (Emitter.narrow_sample), whose integral over tangents that is.
+  float h = light.spread;
+  float cone = PI / 3.0 * h * h * h * spread_attenuation(h, 1.0) / h;
+  return light.radiance * light_tree(light, -direction, position + t * direction, t)
+         * (cone * cos_light * cos_light * cos_light * cos_light);
+}
+
 // Light from this sample's point: returns radiance x (solid angle the sample stands for); the receiver multiplies by
 // f cos. `density` per steradian of choosing this direction, 0 for sources without extent.
 vec3 light_sample(Light light, vec3 position, out vec3 direction, out float density)
@@ -77,6 +111,9 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     }
     density = 1.0 / light.area;
     return light.radiance * (light.area * light_tree(light, -direction, vec3(0.0), 1.0));
+  }
+  if ((LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) && (light.flags & LIGHT_NARROW) != 0) {
+    return light_sample_narrow(light, position, direction, density);
   }
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE) || LIGHT_IS(light, LIGHT_SURFACE)) {
     vec3 to_light = light.point - position;
@@ -156,6 +193,10 @@ float light_distance(Light light, vec3 origin, vec3 direction)
 {
   if (LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION)) {
     return 1e29;
+  }
+  if ((LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) && (light.flags & LIGHT_NARROW) != 0) {
+    vec2 place;
+    return light_plane(light, origin, direction, place);
   }
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE) || LIGHT_IS(light, LIGHT_SURFACE)) {
     return length(light.point - origin);
