@@ -36,6 +36,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .thin_film import sensitivity
+
 ENERGY_SIZE = 32  # nodes along roughness and along mu
 LAYER_SIZE = 16  # nodes along roughness, mu and z
 FINE_SIZE = 32  # and of the dielectric layer in Cycles 5.3 and later
@@ -216,8 +218,8 @@ def sheen_tables() -> dict[str, np.ndarray]:
 
 
 def energy_texture(fine: bool) -> np.ndarray:
-    """The tables packed for the GPU: (64, 192, 4) float32, row first, to be bound as `energy_table`; if `fine`,
-    (160, 192, 4), which tells shaders to do as Cycles 5.3.
+    """The tables packed for the GPU: (64, 256, 4) float32, row first, to be bound as `energy_table`; if `fine`,
+    (160, 256, 4), which tells shaders to do as Cycles 5.3.
 
     R: dielectric[i, j, k] at column i + 16 (k mod 4), row j + 16 (k div 4); G: the same for k + 1, so that one fetch
     gives both ends of the interpolation along z. From column 64 on the same way, R and G: glass; B and A:
@@ -226,10 +228,11 @@ def energy_texture(fine: bool) -> np.ndarray:
     32 + i, row 32 + k, leaving_average beside it from column 48 on. A: the sheen's a[i, j] at column i, row j; its b at
     column 32 + i, row j; its albedo at column i, row 32 + j. From row 64 on, for k < 16, R and G: the table
     dielectric_fine[i, j, k] and that of k + 1 at column i + 32 (k mod 6), row 64 + j + 32 (k div 6); B and A: the same
-    of k + 16. `shaders/lib/energy.glsl` reads exactly this.
+    of k + 16. `shaders/lib/energy.glsl` reads exactly this. From column 192 on, row by row: what colours see of thin
+    films (thin_film.py), its real and its imaginary part beside each other.
     """
     stored = tables()
-    texture = np.zeros((TEXTURE_SIZE + (3 * FINE_SIZE if fine else 0), 3 * TEXTURE_SIZE, 4), np.float32)
+    texture = np.zeros((TEXTURE_SIZE + (3 * FINE_SIZE if fine else 0), 4 * TEXTURE_SIZE, 4), np.float32)
     for name, first, channel in (
         ("dielectric", 0, 0), ("glass", TEXTURE_SIZE, 0), ("glass_reflection", TEXTURE_SIZE, 2),
         ("leaving", 2 * TEXTURE_SIZE, 0), ("leaving_reflection", 2 * TEXTURE_SIZE, 2),
@@ -251,6 +254,8 @@ def energy_texture(fine: bool) -> np.ndarray:
         tile = texture[row : row + FINE_SIZE, column : column + FINE_SIZE]
         tile[..., 2 * (k // 16)] = stored["dielectric_fine"][:, :, k].T
         tile[..., 2 * (k // 16) + 1] = stored["dielectric_fine"][:, :, min(k + 1, FINE_SIZE - 1)].T
+    film = sensitivity().reshape(-1, TEXTURE_SIZE, 3)
+    texture[: len(film), 3 * TEXTURE_SIZE :, :3] = film
     sheen = sheen_tables()
     texture[:SHEEN_SIZE, :SHEEN_SIZE, 3] = sheen["a"].T
     texture[:SHEEN_SIZE, SHEEN_SIZE : 2 * SHEEN_SIZE, 3] = sheen["b"].T

@@ -59,6 +59,7 @@ class MaterialSet:
         self.compiled: list[CompiledMaterial] = []
         self.notes: tuple[Note, ...] = ()
         self.energy_table: images.Image | None = None
+        self._energy_space = ""  # the working space that it was made for
         self._scene: Block | None = None
         self._view: tuple = ()
         self._cache: dict[str, tuple[object, CompiledMaterial]] = {}
@@ -74,8 +75,9 @@ class MaterialSet:
 
     def update(self, snapshot: Snapshot) -> None:
         """Compile and upload what changed."""
-        if self.energy_table is None:
+        if self.energy_table is None or self._energy_space != current().name:
             self.energy_table = images.upload(energy_texture(FINE_LAYERS))
+            self._energy_space = current().name
         before = self.compiled
         cache, self.compiled, notes, self.own_images = {}, [], [], {}
         for material in snapshot.materials:

@@ -1,7 +1,7 @@
 // Albedos of microfacet lobes from the table `energy_table`, and what follows from them: how much a layer leaves for
 // the layer below, and how much light a lobe must gain because it scatters more than once.
 //
-// The host binds `energy_table` (sampler2D, 192 x 64 or 192 x 160 RGBA32F, filled by addon/materials/energy.py, where the layout and
+// The host binds `energy_table` (sampler2D, 256 x 64 or 256 x 160 RGBA32F, filled by addon/materials/energy.py, where the layout and
 // the sources are described) in every program that includes this file. `mu` is the cosine between the lobe's normal
 // and the viewer, `roughness` the artist's roughness (alpha = roughness^2; for anisotropic lobes (ax ay)^(1/4), which
 // is the same value).

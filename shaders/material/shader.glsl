@@ -5,6 +5,8 @@
 #include "lib/color.glsl"
 #include "lib/energy.glsl"
 
+#include "material/thin_film.glsl"
+
 #ifdef SUBSURFACE
 #include "subsurface/closure.glsl"
 #endif
@@ -79,6 +81,27 @@ vec3 add_glossy(inout Closures closures, SurfacePoint point, vec3 weight, int di
   }
   if (closure_glossy(closures, lobe_weight, color_luminance(albedo), fresnel, tint, edge, ior, roughness, anisotropy,
                      tangent, normal)) {
+    closures.distribution = distribution;
+  }
+  return weight * albedo;
+}
+
+// Adds a lobe of microfacets under a thin film, and returns its albedo, weight included: reflectance as seen from here, for
+// light from everywhere. What bounces between facets is as without the film.
+vec3 add_film(inout Closures closures, SurfacePoint point, vec3 weight, int distribution, Film film, int fresnel, vec3 tint,
+              vec3 edge, float ior, float roughness, float anisotropy, vec3 tangent, vec3 normal)
+{
+  float mu = view_cosine(point, normal);
+  float wide = lobe_roughness(lobe_alpha(roughness, anisotropy));
+  vec3 seen = film_seen(film, mu, wide);
+  vec3 albedo = film_reflectance(film, mu);
+  vec3 lobe_weight = weight / multiscatter_scale(FRESNEL_NONE, seen, vec3(1.0), 1.5, wide, mu);
+  if (distribution == DISTRIBUTION_MULTI_GGX) {
+    albedo *= multiscatter_darkening(fresnel, tint, edge, ior, wide, mu);
+    lobe_weight *= multiscatter_scale(fresnel, tint, edge, ior, wide, mu);
+  }
+  if (closure_glossy(closures, lobe_weight, color_luminance(albedo), FRESNEL_NONE, seen, vec3(1.0), 1.5, roughness,
+                     anisotropy, tangent, normal)) {
     closures.distribution = distribution;
   }
   return weight * albedo;
@@ -219,10 +242,18 @@ float lobe_anisotropy(float anisotropy)
 }
 
 void shader_metallic(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, vec3 edge, float roughness,
-                     float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution)
+                     float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution, float film_thickness,
+                     float film_ior)
 {
   vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
   vec3 t = rotated_tangent(tangent, n, rotation);
+  if (film_thickness > FILM_LEAST) {
+    vec3 f0 = clamp(color, vec3(0.0), vec3(1.0));
+    vec3 tint = clamp(edge, vec3(0.0), vec3(1.0));
+    add_film(closures, point, weight, distribution, film_on_metal(film_thickness, film_ior, f0, tint), FRESNEL_F82, f0, tint,
+             1.5, clamp(roughness, 0.0, 1.0), lobe_anisotropy(anisotropy), t, n);
+    return;
+  }
   add_glossy(closures, point, weight, distribution, FRESNEL_F82, clamp(color, vec3(0.0), vec3(1.0)),
              clamp(edge, vec3(0.0), vec3(1.0)), 1.5, clamp(roughness, 0.0, 1.0), lobe_anisotropy(anisotropy), t, n);
 }
@@ -238,7 +269,8 @@ float conductor_reflectance(float cos_i, float n, float k)
 
 // Metal by complex index of refraction: the F82 curve through its exact reflectance at 0 and at 82 degrees.
 void shader_conductor(inout Closures closures, SurfacePoint point, vec3 weight, vec3 ior, vec3 extinction,
-                      float roughness, float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution)
+                      float roughness, float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution,
+                      float film_thickness, float film_ior)
 {
   vec3 f0 = vec3(conductor_reflectance(1.0, ior.x, extinction.x), conductor_reflectance(1.0, ior.y, extinction.y),
                  conductor_reflectance(1.0, ior.z, extinction.z));
@@ -246,7 +278,15 @@ void shader_conductor(inout Closures closures, SurfacePoint point, vec3 weight, 
   vec3 f82 = vec3(conductor_reflectance(c, ior.x, extinction.x), conductor_reflectance(c, ior.y, extinction.y),
                   conductor_reflectance(c, ior.z, extinction.z));
   vec3 edge = f82 / max(mix(f0, vec3(1.0), 0.46266436), vec3(1e-6));
-  shader_metallic(closures, point, weight, f0, edge, roughness, anisotropy, rotation, normal, tangent, distribution);
+  if (film_thickness > FILM_LEAST) {
+    vec3 upright = reflecting_normal(point, unit_or(normal, point.normal));
+    Film film = film_over(film_thickness, film_ior, true, max(ior, vec3(0.0)), max(extinction, vec3(0.0)));
+    add_film(closures, point, weight, distribution, film, FRESNEL_F82, f0, edge, 1.5, clamp(roughness, 0.0, 1.0),
+             lobe_anisotropy(anisotropy), rotated_tangent(tangent, upright, rotation), upright);
+    return;
+  }
+  shader_metallic(closures, point, weight, f0, edge, roughness, anisotropy, rotation, normal, tangent, distribution, 0.0,
+                  1.0);
 }
 
 void shader_emission(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float strength)
@@ -281,7 +321,8 @@ void shader_holdout(inout Closures closures, SurfacePoint point, vec3 weight)
 // Glass: a rough dielectric that mirrors and lets through. What passes is a lobe of its own where the program draws what
 // is bent, and else goes straight on, tinted, with the same energy. `tint` colours the reflectance at normal incidence.
 void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 reflected, vec3 transmitted,
-                       vec3 tint, float ior, float roughness, vec3 normal, int distribution)
+                       vec3 tint, float ior, float roughness, vec3 normal, int distribution, float film_thickness,
+                       float film_ior)
 {
   vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
   float r = clamp(roughness, 0.0, 1.0);
@@ -293,6 +334,25 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
   vec3 scale = weight;
   if (distribution == DISTRIBUTION_MULTI_GGX) {
     scale *= glass_multiscatter(transmitted, mu, r, ior);
+  }
+  if (film_thickness > FILM_LEAST) {
+    // From inside the film lies on the far face: the same with all indices relative to the glass.
+    float relative = (point.refracts && point.backfacing) ? film_ior * ior : film_ior;
+    vec3 face = film_seen(film_on_dielectric(film_thickness, relative, ior, f0), mu, r);
+    if (largest(reflected) > 0.0) {
+      vec3 lobe_scale = multiscatter_scale(FRESNEL_NONE, face, vec3(1.0), 1.5, r, mu);
+      float importance = max(color_luminance(face), point.refracts ? LEAST_MIRRORED : 0.0);
+      closure_glossy(closures, scale * reflected / lobe_scale, importance, FRESNEL_NONE, face, vec3(1.0), 1.5, r, 0.0,
+                     default_tangent(n), n);
+    }
+    vec3 passing = scale * max(transmitted, vec3(0.0)) * (1.0 - face);
+    if (point.refracts) {
+      closure_glossy(closures, passing, 1.0, LOBE_REFRACTION, vec3(0.0), vec3(0.0), ior, r, 0.0, default_tangent(n), n);
+    }
+    else {
+      closure_transparent(closures, passing);
+    }
+    return;
   }
   if (BOTH_WAYS && point.refracts && r <= BOTH_ROUGHNESS && largest(reflected) > 0.0) {
     // As one lobe, so that no sample lacks either of the two.
@@ -331,7 +391,7 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
 // with R at each face and absorbed to a on each way through, the wall reflects R + (1 - R)^2 R a^2 / (1 - R^2 a^2) and
 // lets (1 - R)^2 a / (1 - R^2 a^2) pass; the way through grows with the refracted angle.
 void shader_thin_wall(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base, vec3 tint, float ior,
-                      float roughness, vec3 normal)
+                      float roughness, vec3 normal, float film_thickness, float film_ior)
 {
   float mu = view_cosine(point, normal);
   vec3 f0 = clamp(dielectric_f0(ior) * tint, vec3(0.0), vec3(1.0));
@@ -339,20 +399,26 @@ void shader_thin_wall(inout Closures closures, SurfacePoint point, vec3 weight, 
   vec3 absorbed = pow(clamp(base, vec3(0.0), vec3(1.0)), vec3(1.0 / cos_inside));
   // As in Cycles, roughness spreads the light and leaves its amount.
   vec3 face = clamp(fresnel_reflectance(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, mu), vec3(1e-6), vec3(1.0));
+  bool filmed = film_thickness > FILM_LEAST;
+  if (filmed) {
+    face = clamp(film_seen(film_on_dielectric(film_thickness, film_ior, ior, f0), mu, roughness), vec3(1e-6), vec3(1.0));
+  }
   vec3 entering = (1.0 - face) * (1.0 - face) / max(1.0 - face * face * absorbed * absorbed, vec3(1e-6));
   vec3 mirrored = face + entering * face * absorbed * absorbed;
-  vec3 lobe = glossy_albedo(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, roughness, mu);
-  closure_glossy(closures, weight * mirrored / max(lobe, vec3(1e-6)), color_luminance(mirrored), FRESNEL_DIELECTRIC,
-                 f0, vec3(1.0), ior, roughness, 0.0, default_tangent(normal), normal);
+  int kind = filmed ? FRESNEL_NONE : FRESNEL_DIELECTRIC;
+  vec3 shown = filmed ? face : f0;
+  vec3 lobe = glossy_albedo(kind, shown, vec3(1.0), ior, roughness, mu);
+  closure_glossy(closures, weight * mirrored / max(lobe, vec3(1e-6)), color_luminance(mirrored), kind, shown, vec3(1.0),
+                 ior, roughness, 0.0, default_tangent(normal), normal);
   closure_transparent(closures, weight * entering * absorbed);
 }
 
 void shader_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, float ior,
-                  vec3 normal, int distribution)
+                  vec3 normal, int distribution, float film_thickness, float film_ior)
 {
   vec3 positive = max(color, vec3(0.0));
   add_glass(closures, point, weight, positive, positive, vec3(1.0), clamp(ior, 1e-5, MOST_IOR), roughness, normal,
-            distribution);
+            distribution, film_thickness, max(film_ior, 1e-5));
 }
 
 // What passes an interface without the losses of reflection.
@@ -409,7 +475,7 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
 }
 
 // Principled BSDF, from the top layer down: alpha, sheen, coat, emission, metal, transmission, specular, diffuse.
-// Not drawn: thin film. Drawn simpler: light passes thin walls straight on.
+// Drawn simpler: light passes thin walls straight on.
 void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base_color, float metallic,
                        float roughness, float ior, float alpha, vec3 normal, float diffuse_roughness,
                        float specular_level, vec3 specular_tint, float anisotropy, float rotation, vec3 tangent,
@@ -418,7 +484,7 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
                        int subsurface_method,
                        float coat_weight, float coat_roughness, float coat_ior, vec3 coat_tint,
                        vec3 coat_normal, float sheen_weight, float sheen_roughness, vec3 sheen_tint,
-                       vec3 emission_color, float emission_strength, int distribution)
+                       vec3 emission_color, float emission_strength, int distribution, float film_thickness, float film_ior)
 {
   vec3 n = unit_or(normal, point.normal);
   vec3 mirror_normal = reflecting_normal(point, n);
@@ -444,19 +510,27 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   vec3 t = (stretch > 0.0) ? rotated_tangent(tangent, mirror_normal, rotation) : default_tangent(mirror_normal);
   float metal = clamp(metallic, 0.0, 1.0);
   if (metal > SMALLEST_WEIGHT) {
-    add_glossy(closures, point, w * metal, distribution, FRESNEL_F82, min(base, vec3(1.0)),
-               clamp(specular_tint, vec3(0.0), vec3(1.0)), ior, r, stretch, t, mirror_normal);
+    vec3 edge = clamp(specular_tint, vec3(0.0), vec3(1.0));
+    if (film_thickness > FILM_LEAST) {
+      Film film = film_on_metal(film_thickness, film_ior, min(base, vec3(1.0)), edge);
+      add_film(closures, point, w * metal, distribution, film, FRESNEL_F82, min(base, vec3(1.0)), edge, ior, r, stretch, t,
+               mirror_normal);
+    }
+    else {
+      add_glossy(closures, point, w * metal, distribution, FRESNEL_F82, min(base, vec3(1.0)), edge, ior, r, stretch, t,
+                 mirror_normal);
+    }
     w *= 1.0 - metal;
   }
   float through = clamp(transmission, 0.0, 1.0);
   if (through > SMALLEST_WEIGHT) {
     if (thin_wall > 0.5) {
       shader_thin_wall(closures, point, w * through, base, max(specular_tint, vec3(0.0)), clamp(ior, 1.0, MOST_IOR), r,
-                       mirror_normal);
+                       mirror_normal, film_thickness, max(film_ior, 1e-5));
     }
     else {
       add_glass(closures, point, w * through, vec3(1.0), sqrt(min(base, vec3(1.0))), max(specular_tint, vec3(0.0)),
-                clamp(ior, 1e-5, MOST_IOR), r, mirror_normal, distribution);
+                clamp(ior, 1e-5, MOST_IOR), r, mirror_normal, distribution, film_thickness, max(film_ior, 1e-5));
     }
     w *= 1.0 - through;
   }
@@ -466,7 +540,12 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   vec3 f0;
   float specular_ior;
   principled_specular(clamp(ior, 1e-5, MOST_IOR), specular_level, max(specular_tint, vec3(0.0)), f0, specular_ior);
-  if (specular_ior != 1.0) {
+  if (film_thickness > FILM_LEAST) {
+    Film film = film_on_dielectric(film_thickness, film_ior, specular_ior, f0);
+    w = below_layer(w, add_film(closures, point, w, distribution, film, FRESNEL_DIELECTRIC, f0, vec3(1.0), specular_ior, r,
+                                stretch, t, mirror_normal));
+  }
+  else if (specular_ior != 1.0) {
     vec3 albedo = add_glossy(closures, point, w, distribution, FRESNEL_DIELECTRIC, f0, vec3(1.0), specular_ior, r,
                              stretch, t, mirror_normal);
     w = below_layer(w, albedo);

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from addon.gfx import images, passes
+from addon.materials.energy import energy_texture
+from addon.materials.sky import XYZ_TO_RGB
+from addon.materials.thin_film import _matching
 
 
-def evaluated(include: str, expression: str, count: int = 64, **given) -> np.ndarray:
+def evaluated(include: str, expression: str, count: int = 64, bound=None, **given) -> np.ndarray:
     """(count, 4) a GLSL expression of `k`, 0 to 1 over the pixels, with functions of a shader file."""
     source = f'''#include "{include}"
 void main()
@@ -19,7 +22,7 @@ void main()
         snippets=(("generated/main", source),), **given,
     )  # fmt: skip
     with images.borrowed(count, 1, "RGBA32F") as target:
-        passes.fullscreen(program, target)
+        passes.fullscreen(program, target, textures=bound or {})
         return images.read(target.colors[0])[0].astype(np.float64)
 
 
@@ -58,3 +61,44 @@ def test_the_level_of_an_image_has_texels_as_wide_as_the_footprint_is_across(gpu
     found = evaluated("material/image.glsl", f"vec4({probes}.mip, float({probes}.count), k, 0.0)")
     np.testing.assert_allclose(found[:, 0], np.log2(1 + 31 * found[:, 2]), atol=1e-3)
     np.testing.assert_array_equal(found[:, 1], aspect)
+
+
+@pytest.mark.parametrize(
+    ("thickness", "film", "below"), [(120.0, 1.38, 1.52), (550.0, 1.33, 1.0), (300.0, 1.9, 2.0 + 3.0j)]
+)
+def test_a_thin_film_reflects_what_airys_formula_says(gpu_context, thickness, film, below):
+    """Waves of each wavelength by Airy's closed form, seen with the matching functions of red, green and blue.
+    At grazing angles the sum, which as in Cycles ends after three paths, has not yet come to its end."""
+    wavelengths, matching = _matching()
+    colors = matching @ XYZ_TO_RGB.T
+    colors = colors / colors.sum(axis=0)
+    conducts = str(isinstance(below, complex)).lower()
+    values = f"{thickness}, {film}, {conducts}, vec3({np.real(below)}), vec3({np.imag(below)})"
+    f0 = abs((1 - below) / (1 + below)) ** 2
+    source = f"film_over({values})"
+    if not isinstance(below, complex):
+        source = f"film_on_dielectric({thickness}, {film}, {below}, vec3({f0}))"
+    table = images.upload(energy_texture(False))
+    found = evaluated(
+        "material/thin_film.glsl", f"vec4(film_reflectance({source}, 0.2 + 0.8 * k), 0.2 + 0.8 * k)",
+        bound={"energy_table": table}, textures=(("RGBA32F", "energy_table"),),
+    )  # fmt: skip
+    cosine = found[1:, 3][:, None]
+    inside = np.sqrt(1 - (1 - cosine**2) / film**2 + 0j)
+    last = np.sqrt(1 - (1 - cosine**2) / below**2 + 0j)
+    turn = np.exp(2j * np.pi * 2 * film * thickness * inside / wavelengths)
+    total = 0.0
+    for upper, lower in (
+        (
+            (cosine - film * inside) / (cosine + film * inside),
+            (film * inside - below * last) / (film * inside + below * last),
+        ),
+        (
+            (film * cosine - inside) / (film * cosine + inside),
+            (below * inside - film * last) / (below * inside + film * last),
+        ),
+    ):
+        total = total + 0.5 * np.abs((upper + lower * turn) / (1 + upper * lower * turn)) ** 2
+    apart = np.abs(found[1:, :3] - total @ colors)
+    print(f"mean {apart.mean():.5f}, most {apart.max():.5f}")
+    assert apart.mean() < 2e-3 and apart.max() < 0.02

@@ -32,7 +32,7 @@ TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy"
 SUBSURFACE_METHODS = {"BURLEY": 0, "RANDOM_WALK": 1, "RANDOM_WALK_SKIN": 2, "RANDOM_WALK_LEGACY": 3}
 # About the longest scale of the profile over the radius: by these the points of light below surfaces are spread.
 SUBSURFACE_REACH = {"BURLEY": 0.24, "RANDOM_WALK": 3.0, "RANDOM_WALK_SKIN": 0.6, "RANDOM_WALK_LEGACY": 0.24}
-THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
+THIN_FILM = (Socket("Thin Film Thickness", "FLOAT", layer=True), Socket("Thin Film IOR", "FLOAT", 1.33))
 
 
 def _passing(sockets: dict[str, Estimate]) -> Estimate:
@@ -170,12 +170,10 @@ PRINCIPLED = Entry(
         Socket("Emission Color", "COLOR", WHITE),
         Socket("Emission Strength", "FLOAT", layer=True),
         DISTRIBUTION,
+        *THIN_FILM,
     ),
     include="material/shader.glsl",
-    approximations=(
-        Approximation("Thin Wall", 0.0, "Light passes thin walls straight on, without roughness."),
-        THIN_FILM,
-    ),
+    approximations=(Approximation("Thin Wall", 0.0, "Light passes thin walls straight on, without roughness."),),
     summary=_principled,
 )
 
@@ -209,20 +207,19 @@ ENTRIES = (
     Entry(
         "ShaderNodeBsdfMetallic",
         "shader_metallic",
-        (Socket("Base Color", "COLOR", GREY), Socket("Edge Tint", "COLOR", WHITE), *GLOSSY_SHAPE),
+        (Socket("Base Color", "COLOR", GREY), Socket("Edge Tint", "COLOR", WHITE), *GLOSSY_SHAPE, *THIN_FILM),
         include="material/shader.glsl",
         when={"fresnel_type": "F82"},
-        approximations=(THIN_FILM,),
         summary=_glossy,
     ),
     Entry(
         "ShaderNodeBsdfMetallic",
         "shader_conductor",
         (Socket("IOR", "VECTOR", (2.757, 2.513, 2.231)), Socket("Extinction", "VECTOR", (3.867, 3.404, 3.009)))
-        + GLOSSY_SHAPE,
+        + GLOSSY_SHAPE
+        + THIN_FILM,
         include="material/shader.glsl",
-        approximations=(THIN_FILM,),
-        note="The reflectance of the physical conductor is fitted by an F82 curve.",
+        note="The reflectance of the physical conductor is fitted by an F82 curve, unless it bears a thin film.",
         summary=_glossy,
     ),
     Entry(
@@ -308,9 +305,9 @@ ENTRIES = (
             Socket("IOR", "FLOAT", 1.5),
             NORMAL,
             DISTRIBUTION,
+            *THIN_FILM,
         ),
         include="material/shader.glsl",
-        approximations=(THIN_FILM,),
         setting_approximations=BECKMANN_GLASS,
         summary=_glass,
     ),
