@@ -9,8 +9,9 @@ the sample's end: irradiance in W/m2, and the distance along the view's axis of 
 of the texels around its place whose surface lies on its plane. Shadow rays of hits take glass as opaque for the lights
 answered for, as those of pixels do.
 
-Cost, per sample and view: a draw of the surfaces, the splats, a pass over the map; per view and round of rays a pass
-over the hits; 4 x 4 bytes a texel of SIDE x SIDE for each view, and of one view 7 x 4 x 4 more.
+Cost, per sample and view: a draw of the surfaces, the splats, a pass over the map; per round of rays a pass over the
+hits for each CELLS views, which share an image; 4 x 4 bytes a texel of SIDE x SIDE for each of its cells, and of one view
+7 x 4 x 4 more.
 
 Bias: the map's texels, and what the light's view does not show. At most MOST views of a sample are kept, those that
 come first; lights beyond them keep their grey shadows there.
@@ -20,7 +21,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -29,7 +30,7 @@ from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..gfx.struct import Block
+from ..gfx.struct import Block, Struct
 from ..kernels import splats
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
@@ -39,6 +40,8 @@ from .path_sources import ShadedLobes
 from .photons import MAP, Bundle, LitView, Photons
 
 SIDE, MOST = 384, 8
+COLUMNS, ROWS = 4, 2
+CELLS = COLUMNS * ROWS  # of an image of kept maps, which a pass over hits asks all
 EXTENT = 3.0  # of the map, beside the casters as the light sees them
 LEAST_TEXELS = 0.9
 INTO_MAP = splats.splat_program(
@@ -54,8 +57,11 @@ KEEP = passes.fullscreen_program(
     "caustics/keep.frag.glsl",
     textures=(("RGBA32F", "caustic_map"), ("RGBA32F", "receiver_position")),
     blocks=((VIEW, "map_view"),),
+    constants=(("IVEC2", "cell_corner"),),
     outputs=(("VEC4", "out_kept"),),
 )
+KEPT_FIELDS = ("row_x", "row_y", "row_w", "eye", "right", "up", "backward", "frame")  # of VIEW, by cell
+KEPT_VIEWS = Struct("KeptViews", *(("vec4", f"{name}[{CELLS}]") for name in KEPT_FIELDS))
 SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "surface_normal", "surface_diffuse"))
 
 
@@ -65,9 +71,13 @@ def at_hits_program(transmission: bool) -> Program:
     return passes.fullscreen_program(
         "caustic map at hits",
         "caustics/at_hits.frag.glsl",
-        textures=(*SEEN, *(("RGBA32F", name) for name in ("met_path", "hit_passed", "kept_map"))),
-        blocks=((VIEW, "map_view"),),
-        defines=(("TRANSMISSION", "1"),) if transmission else (),
+        textures=(*SEEN, *(("RGBA32F", name) for name in ("met_path", "hit_passed", "kept_maps"))),
+        blocks=((KEPT_VIEWS, "kept_views"),),
+        constants=(("INT", "map_count"),),
+        defines=(
+            ("MAP_SIDE", str(SIDE)), ("MAP_COLUMNS", str(COLUMNS)),
+            *((("TRANSMISSION", "1"),) if transmission else ()),
+        ),
         outputs=tuple(("VEC4", f"out_{path}_indirect") for path in paths),
     )
 
@@ -75,24 +85,33 @@ def at_hits_program(transmission: bool) -> Program:
 PROGRAMS = (INTO_MAP, KEEP, *(at_hits_program(transmission) for transmission in (False, True)))
 
 
-@dataclass(frozen=True)
-class KeptMap:
-    """Irradiance (rgb) and distance (w; 0: nothing) of what a light's view shows."""
+@dataclass
+class KeptMaps:
+    """Up to CELLS maps in one image: irradiance (rgb) and distance (w; 0: nothing) of what a light's view shows."""
 
     image: images.Image
-    block: Block
+    block: Block | None = None
+    views: list[dict] = field(default_factory=list)  # fields of VIEW, by cell
+
+    @property
+    def next_corner(self) -> tuple[int, int]:
+        """Of the first cell that is free."""
+        number = len(self.views)
+        return number % COLUMNS * SIDE, number // COLUMNS * SIDE
 
 
 class CausticMaps:
     """Maps of the sample that is drawn. One for each renderer: `frame.kept(CausticMaps)`."""
 
     def __init__(self):
-        self.maps: list[KeptMap] = []
+        self.maps: list[KeptMaps] = []
+        self._count = 0  # of maps
         self.lights: set[str] = set()  # keys of those that the maps of this or another sample are of
         self._sample: tuple[weakref.ref[Frame], int] | None = None
         self._pending: tuple[LitView, LightView, images.Image] | None = None
         self._receivers = LightBuffers()
         self._map: images.Target | None = None
+        self._block: Block | None = None
         self._blocks: list[Block] = []
         self._shift = np.zeros(2)
         self._lasting = False
@@ -115,9 +134,9 @@ class CausticMaps:
         """Give the maps back."""
         for one in self.maps:
             images.pool.give(one.image)
-        self.maps, self.lights, self._sample = [], set(), None
+        self.maps, self._count, self.lights, self._sample = [], 0, set(), None
 
-    def of(self, frame: Frame) -> list[KeptMap]:
+    def of(self, frame: Frame) -> list[KeptMaps]:
         """The maps of the sample that `frame` is drawing."""
         if self._sample is None or self._sample[0]() is not frame:
             return []
@@ -128,7 +147,7 @@ class CausticMaps:
         there are maps of all views or of none."""
         if frame.service(ShadedLobes) is None:
             return False
-        return len(self.maps) < MOST or light.emitter.light.key in self.lights
+        return self._count < MOST or light.emitter.light.key in self.lights
 
     def add(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, photons: Photons
@@ -156,22 +175,35 @@ class CausticMaps:
         """Keep the map that was splatted last."""
         light, view, position = self._pending
         self._pending = None
-        number = len(self.maps)
         values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
-        if number == len(self._blocks):
-            self._blocks.append(Block(VIEW, **values))
-        else:
-            self._blocks[number].update(**values)
-        kept = KeptMap(images.pool.take(SIDE, SIDE, "RGBA32F"), self._blocks[number])
+        self._block = _updated(self._block, VIEW, values)
+        if not self.maps or len(self.maps[-1].views) == CELLS:
+            self.maps.append(KeptMaps(images.pool.take(COLUMNS * SIDE, ROWS * SIDE, "RGBA32F")))
+        kept = self.maps[-1]
+        corner = kept.next_corner
         passes.fullscreen(
             KEEP,
             images.Target((kept.image,)),
+            viewport=(*corner, SIDE, SIDE),
             textures={"caustic_map": self._map.colors[0], "receiver_position": position},
-            blocks={"map_view": kept.block},
+            blocks={"map_view": self._block},
+            constants={"cell_corner": corner},
         )
         frame.count(technique, "passes")
-        self.maps.append(kept)
+        kept.views.append(values)
+        kept.block = None
+        self._count += 1
         self.lights.add(light.emitter.light.key)
+
+    def ready(self, frame: Frame) -> list[KeptMaps]:
+        """`of`, with the blocks that programs bind."""
+        found = self.of(frame)
+        for number, one in enumerate(found):
+            if one.block is None:
+                if number == len(self._blocks):
+                    self._blocks.append(None)
+                one.block = self._blocks[number] = _updated(self._blocks[number], KEPT_VIEWS, _by_cell(one.views))
+        return found
 
     def release(self) -> None:
         """Give all images back."""
@@ -182,8 +214,24 @@ class CausticMaps:
         self.__init__()
 
 
+def _updated(block: Block | None, struct: Struct, values: dict) -> Block:
+    if block is None:
+        return Block(struct, **values)
+    block.update(**values)
+    return block
+
+
+def _by_cell(views: list[dict]) -> dict[str, np.ndarray]:
+    """Fields of KEPT_VIEWS."""
+    found = {name: np.zeros((CELLS, 4), np.float32) for name in KEPT_FIELDS}
+    for cell, view in enumerate(views):
+        for name in KEPT_FIELDS:
+            found[name][cell] = view[name]
+    return found
+
+
 def add_at_hits(
-    frame: Frame, technique: Technique, maps: Iterable[KeptMap], target: images.Target, transmission: bool, where: str,
+    frame: Frame, technique: Technique, maps: Iterable[KeptMaps], target: images.Target, transmission: bool, where: str,
     textures: dict[str, images.Image],
 ) -> None:  # fmt: skip
     """Add the caustics of `maps` at hits into images of indirect light. `textures`: closures of the hits (surface_*),
@@ -197,7 +245,8 @@ def add_at_hits(
             target,
             blend="ADDITIVE_PREMULT",
             where=where,
-            textures={**bound, "kept_map": one.image},
-            blocks={"map_view": one.block},
+            textures={**bound, "kept_maps": one.image},
+            blocks={"kept_views": one.block},
+            constants={"map_count": len(one.views)},
         )
         frame.count(technique, "passes")

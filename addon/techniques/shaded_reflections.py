@@ -266,7 +266,7 @@ class ShadedReflections(Technique, BothWays):
             return
         hits, transmission = frame.kept(Hits), refracts(frame)
         maps = frame.kept(CausticMaps)
-        caustics = maps.of(frame)
+        caustics = maps.ready(frame)
         rows = self._sources.rows(frame, maps.lights if caustics else ())
         sources = self._sources.block(rows)
         mirrors = min(frame.settings.get(self, "bounces"), frame.settings.bounces)

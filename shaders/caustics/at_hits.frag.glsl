@@ -1,8 +1,32 @@
-// The caustic of a light on what rays have met: what diffuse closures there reflect of the irradiance that a kept map holds
-// for their place. Of the four texels around it those count whose surface lies on the hit's plane.
+// The caustics of lights on what rays have met: what diffuse closures there reflect of the irradiance that kept maps hold
+// for their place. Of the four texels around it those count whose surface lies on the hit's plane. The maps are cells of
+// one image.
 #include "lib/gbuffer.glsl"
 #include "hits/path.glsl"
+
+// What is asked of a light's view (VIEW).
+struct KeptView {
+  vec4 row_x;
+  vec4 row_y;
+  vec4 row_w;
+  vec4 eye;
+  vec4 right;
+  vec4 up;
+  vec4 backward;
+  vec4 frame;
+  vec4 film;
+};
+
+KeptView map_view;
+
 #include "caustics/map_texels.glsl"
+
+KeptView view_of_cell(int cell)
+{
+  return KeptView(kept_views.row_x[cell], kept_views.row_y[cell], kept_views.row_w[cell], kept_views.eye[cell],
+                  kept_views.right[cell], kept_views.up[cell], kept_views.backward[cell], kept_views.frame[cell],
+                  vec4(float(MAP_SIDE)));
+}
 
 // Place that a texel of the map shows, `depth` along the view's axis.
 vec3 place_of(vec2 texel, vec2 size, float depth)
@@ -13,9 +37,10 @@ vec3 place_of(vec2 texel, vec2 size, float depth)
   return map_view.eye.xyz + spread * across - depth * map_view.backward.xyz;
 }
 
-vec3 irradiance_at(vec3 position, vec3 normal)
+// Of the map in the cell at `corner`, whose view is `map_view`.
+vec3 irradiance_at(vec3 position, vec3 normal, ivec2 corner)
 {
-  ivec2 size = kept_map_size();
+  ivec2 size = ivec2(MAP_SIDE);
   MapPlace at = map_place(position, size);
   if (!at.inside) {
     return vec3(0.0);
@@ -29,7 +54,7 @@ vec3 irradiance_at(vec3 position, vec3 normal)
   float weights = 0.0;
   for (int k = 0; k < 4; k++) {
     ivec2 other = map_texel(at, k, size);
-    vec4 kept = kept_map_fetch(other);
+    vec4 kept = kept_maps_fetch(corner + other);
     vec3 offset = place_of(vec2(other), vec2(size), kept.w) - position;
     float weight = (kept.w > 0.0) ? map_weight(at, k, offset, normal) : 0.0;
     sum += weight * kept.rgb;
@@ -53,7 +78,12 @@ void main()
     return;
   }
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
-  vec3 reflected = albedo / PI * irradiance_at(place.xyz, normal);
+  vec3 irradiance = vec3(0.0);
+  for (int cell = 0; cell < map_count; cell++) {
+    map_view = view_of_cell(cell);
+    irradiance += irradiance_at(place.xyz, normal, MAP_SIDE * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
+  }
+  vec3 reflected = albedo / PI * irradiance;
   vec4 light = vec4(path.rgb * hit_passed_fetch(pixel).rgb * reflected, 0.0);
   if (path_is_glossy(code)) {
     out_glossy_indirect = light;

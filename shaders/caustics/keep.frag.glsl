@@ -2,7 +2,7 @@
 
 void main()
 {
-  ivec2 texel = ivec2(gl_FragCoord.xy);
+  ivec2 texel = ivec2(gl_FragCoord.xy) - cell_corner;
   vec4 place = receiver_position_fetch(texel);
   out_kept = vec4(0.0);
   if (place.w != 0.0) {
