@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count as counting
-from weakref import WeakKeyDictionary, ref
+from weakref import ref
 
 import gpu
 import numpy as np
@@ -145,29 +145,43 @@ class _Framebuffers:
     """Framebuffers of a GPU context by the images that they hold. They go with any of those."""
 
     def __init__(self):
-        # By first image, then by the numbers of all: the framebuffer, and what tells whether one of them is gone.
-        self._of: WeakKeyDictionary[Image, dict[tuple, tuple[gpu.types.GPUFrameBuffer, list]]] = WeakKeyDictionary()
+        # By number of the first image, then by the numbers of all: the framebuffer, and what tells whether one of them
+        # is gone. Plain numbers, since this is asked for each pass, and keys that are objects take many times longer.
+        self._of: dict[int, dict[tuple, tuple[gpu.types.GPUFrameBuffer, list]]] = {}
+        self._first: dict[int, ref[Image]] = {}
 
     def over(self, colors: tuple[Image, ...], depth: Image | None) -> gpu.types.GPUFrameBuffer:
         """The framebuffer of these images, made when first asked for."""
-        global framebuffer_count
         key = (*[image.number for image in colors], -1 if depth is None else -2 - depth.number)
-        own = self._of.get(colors[0] if colors else depth)
-        if own is None:
-            own = self._of[colors[0] if colors else depth] = {}
-        found = own.pop(key, None)
+        own = self._of.get(key[0])
+        found = own.pop(key, None) if own else None
         if found is None:
-            for gone in [known for known, (_, held) in own.items() if any(one() is None for one in held)]:
-                del own[gone]
-            while len(own) >= MOST_FRAMEBUFFERS:
-                del own[next(iter(own))]
-            slots = {"color_slots": [image.texture for image in colors]} if colors else {}
-            if depth is not None:
-                slots["depth_slot"] = depth.texture
-            found = gpu.types.GPUFrameBuffer(**slots), [ref(one) for one in (*colors, depth) if one is not None]
-            framebuffer_count += 1
+            own, found = self._made(key[0], colors, depth)
         own[key] = found
         return found[0]
+
+    def _made(self, number: int, colors: tuple[Image, ...], depth: Image | None):
+        global framebuffer_count
+        own = self._of.get(number)
+        if own is None:
+            own = self._of[number] = {}
+            of, first = self._of, self._first
+
+            def gone(_) -> None:
+                of.pop(number, None)
+                first.pop(number, None)
+
+            first[number] = ref(colors[0] if colors else depth, gone)
+        for known in [known for known, (_, held) in own.items() if any(one() is None for one in held)]:
+            del own[known]
+        while len(own) >= MOST_FRAMEBUFFERS:
+            del own[next(iter(own))]
+        slots = {"color_slots": [image.texture for image in colors]} if colors else {}
+        if depth is not None:
+            slots["depth_slot"] = depth.texture
+        framebuffer_count += 1
+        held = [ref(one) for one in (*colors, depth) if one is not None]
+        return own, (gpu.types.GPUFrameBuffer(**slots), held)
 
 
 # A framebuffer works in one GPU context only and must end before it. Images, programs and buffers are shared by all

@@ -180,14 +180,19 @@ class Shader:
             self._refuse(textures, images, blocks, constants)
         self.handle.bind()
         try:
+            setters = self._blocks
             for name, block in blocks.items():
-                self._blocks[name](name, block.buffer)
+                setters[name](name, block.buffer)
+            setters = self._textures
             for name, image in textures.items():
-                self._textures[name](name, image.texture)
-            for name, image in images.items():
-                self._images[name](name, image.texture)
+                setters[name](name, image.texture)
+            if images:
+                setters = self._images
+                for name, image in images.items():
+                    setters[name](name, image.texture)
+            setters = self._constants
             for name, value in constants.items():
-                self._constants[name](name, value)
+                setters[name](name, value)
         except KeyError:
             self._refuse(textures, images, blocks, constants)
             raise
@@ -271,7 +276,8 @@ def get(program: Program) -> Shader:
         shader = _shaders[program] = Shader(program)
         compile_seconds += time.perf_counter() - started
     shader.used = context.pictures
-    shader.kept.lasts = shader.kept.lasts or images.lasts()
+    if not shader.kept.lasts:
+        shader.kept.lasts = images.lasts()
     return shader
 
 

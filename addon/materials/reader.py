@@ -314,31 +314,34 @@ class _Reading:
             self.nodes[key] = self._node(key, place, node)
 
     def _node(self, key: str, place: _Place, node) -> Node:
-        inputs, links = {}, self._links_of(place.tree)
+        inputs, links, kind = {}, self._links_of(place.tree), node.bl_idname
         for socket in node.inputs:
             if not socket.enabled:
                 continue
             if socket.as_pointer() in links:
                 inputs[socket.identifier] = self.source(place, node, socket)
-            else:  # most
-                inputs[socket.identifier] = Input(_kind(socket), _default(socket))
-        if node.bl_idname in CONSTANT_NODES:
+                continue
+            value = getattr(socket, "default_value", None)  # most: by hand, since a scene has thousands of them
+            if type(value) is not float:
+                value = _plain_default(socket, value)
+            inputs[socket.identifier] = Input(KINDS.get(socket.type, "OTHER"), value)
+        if kind in CONSTANT_NODES:
             for socket in node.outputs:
                 # The Normal node has an input of the same name beside the direction in its output.
-                name = CONSTANT_NODES[node.bl_idname].get(socket.identifier, socket.identifier)
+                name = CONSTANT_NODES[kind].get(socket.identifier, socket.identifier)
                 if hasattr(socket, "default_value") and name not in inputs:
                     inputs[name] = Input(_kind(socket), _default(socket))
         outputs = {socket.identifier: _kind(socket) for socket in node.outputs}
         label = node.label or OF_INLINED.sub("", node.name)
         settings = _settings(node)
-        image = sky_of(settings) if node.bl_idname == "ShaderNodeTexSky" else getattr(node, "image", None)
+        image = sky_of(settings) if kind == "ShaderNodeTexSky" else getattr(node, "image", None)
         user = getattr(node, "image_user", None)
-        if node.bl_idname == "ShaderNodeTexIES":
+        if kind == "ShaderNodeTexIES":
             image, user = _profile(node), label
         return Node(
             key,
             " / ".join((*place.path, label)),
-            node.bl_idname,
+            kind,
             inputs,
             outputs,
             {**settings, **self._surroundings(node)},
@@ -425,7 +428,11 @@ def _kind(socket) -> str:
 
 def _default(socket) -> tuple[float, ...] | float | None:
     """The constant of an unlinked socket; None for shaders and for kinds that are neither numbers nor names."""
-    value = getattr(socket, "default_value", None)
+    return _plain_default(socket, getattr(socket, "default_value", None))
+
+
+def _plain_default(socket, value) -> tuple[float, ...] | float | str | None:
+    """The same of what Blender says its default is."""
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, (bool, int, float)):

@@ -20,7 +20,7 @@ Anew where meshes, materials of meshes, or instances come and go, not where they
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,11 +56,23 @@ class Joint:
     parts: list[Part]
     boxes: Boxes  # of the chunks of all parts
     left: np.ndarray
+    leaders: np.ndarray  # by draw of the geometry: of the part that has it; -1 where none has
+    members: dict[int, frozenset[int]]  # by leader of a part, the materials that it shows
 
-    def calls(self, rows: np.ndarray) -> Iterator[tuple[Part, list[tuple[int, int]]]]:
-        """Parts of which a view may see something, with the runs of triangles (first, count) that draw it."""
+    def of(self, materials: Collection[int]) -> tuple[frozenset[int], np.ndarray]:
+        """Leaders of the parts that show none but these materials, and the mask of the draws that are left then."""
+        whole = frozenset(leader for leader, shown in self.members.items() if shown.issubset(materials))
+        return whole, ~np.isin(self.leaders, list(whole))
+
+    def calls(
+        self, rows: np.ndarray, whole: frozenset[int] | None = None
+    ) -> Iterator[tuple[Part, list[tuple[int, int]]]]:
+        """Parts (of these leaders) of which a view may see something, with the runs of triangles (first, count) that
+        draw it."""
         seen = self.boxes.seen(rows)
         for part in self.parts:
+            if whole is not None and part.leader not in whole:
+                continue
             runs = joined(part.first, seen[part.own])
             if runs:
                 yield part, runs
@@ -97,7 +109,13 @@ class JointDraws:
             parts.append(Part(leader, batch, first, slice(count, count + len(edges))))
             count += len(edges)
         left = np.array([not together[draw.material] for draw in geometry.draws], bool)
-        self._joint = Joint(parts, Boxes.between(np.concatenate(lows), np.concatenate(highs)), left)
+        leaders = np.array([materials.leaders[d.material] if together[d.material] else -1 for d in geometry.draws], int)
+        members: dict[int, set[int]] = {}
+        for draw, leader in zip(geometry.draws, leaders.tolist()):
+            members.setdefault(leader, set()).add(draw.material)
+        shown = {part.leader: frozenset(members.get(part.leader, ())) for part in parts}
+        boxes = Boxes.between(np.concatenate(lows), np.concatenate(highs))
+        self._joint = Joint(parts, boxes, left, leaders, shown)
         return self._joint
 
     def release(self) -> None:

@@ -243,11 +243,11 @@ def _submit(
     left = None
     of_surfaces = program_of == frame.materials.surface_program
     stand_ins = frame.shared(StandIns).of if of_surfaces else {}
-    if of_surfaces and materials is None and indices is None and not stand_ins:
+    if of_surfaces and indices is None and not stand_ins:
         joint = frame.kept(JointDraws).update(geometry, frame.materials)
         if joint is not None:
-            _submit_joint(frame, technique, joint, constants, view, rows)
-            left = joint.left
+            whole, left = (None, joint.left) if materials is None else joint.of(materials)
+            _submit_joint(frame, technique, joint, constants, view, rows, whole)
     if left is not None and not left.any():
         return
     seen = geometry.boxes.seen(rows) if left is None else geometry.boxes.seen(rows) & left
@@ -280,9 +280,11 @@ def _submit(
         passes.set_culling("NONE")
 
 
-def _submit_joint(frame: Frame, technique: Technique, joint: Joint, constants: dict, view: Block, rows) -> None:
-    """The same of materials that are drawn together."""
-    for part, runs in joint.calls(rows):
+def _submit_joint(
+    frame: Frame, technique: Technique, joint: Joint, constants: dict, view: Block, rows, whole: frozenset[int] | None
+) -> None:  # fmt: skip
+    """The same of materials that are drawn together: of all parts, or of those with these leaders."""
+    for part, runs in joint.calls(rows, whole):
         program = frame.materials.surface_program(part.leader)
         shader = passes.get(program)
         bindings, _ = frame.materials.drawing(part.leader, program, frame.geometry.instances)
