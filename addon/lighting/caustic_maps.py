@@ -75,7 +75,8 @@ def at_hits_program(transmission: bool) -> Program:
         blocks=((KEPT_VIEWS, "kept_views"),),
         constants=(("INT", "map_count"),),
         defines=(
-            ("MAP_SIDE", str(SIDE)), ("MAP_COLUMNS", str(COLUMNS)),
+            ("MAP_SIDE", str(SIDE)),
+            ("MAP_COLUMNS", str(COLUMNS)),
             *((("TRANSMISSION", "1"),) if transmission else ()),
         ),
         outputs=tuple(("VEC4", f"out_{path}_indirect") for path in paths),
