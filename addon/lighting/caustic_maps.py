@@ -10,8 +10,8 @@ of the texels around its place whose surface lies on its plane. Shadow rays of h
 answered for, as those of pixels do.
 
 Cost, per sample and view: a draw of the surfaces, the splats, a pass over the map; per round of rays a pass over the
-hits for each CELLS views, which share an image; 4 x 4 bytes a texel of SIDE x SIDE for each of its cells, and of one view
-7 x 4 x 4 more.
+hits for each CELLS views, which share an image; 4 x 4 bytes a texel of SIDE x SIDE for each of its cells, and of one
+view 7 x 4 x 4 more.
 
 Bias: the map's texels, and what the light's view does not show. At most MOST views of a sample are kept, those that
 come first; lights beyond them keep their grey shadows there.
