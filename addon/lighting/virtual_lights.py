@@ -52,9 +52,9 @@ from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
 from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
+from .leaving_light import lit_at_hits
 from .light_choice import GROUP, Choice, seen_middle
-from .linked import linked_at_hits
-from .media import MediaService, dimmed
+from .media import MediaService
 
 PROBES, DRAFT_PROBES = (16, 12), (12, 8)
 LEAST_RAYS, DRAFT_RAYS = 6, 3  # per probe
@@ -114,6 +114,7 @@ PAIRS = passes.fullscreen_program(
     constants=(*PATH_CONSTANTS, ("INT", "rays"), ("INT", "candidate_count")),
     defines=(*ordered_lists.DEFINES, ("GROUP", str(GROUP))),
     outputs=(("FLOAT", "out_density"),),
+    leaves_out=(("leaving", "densities ask for no light"),),
 )  # fmt: skip
 
 LIGHTS = passes.fullscreen_program(
@@ -323,7 +324,7 @@ class VirtualLights:
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
         bindings = self._probing(frame, grid)
-        program = linked_at_hits(frame, dimmed(frame, candidates_program(self.kinds), bindings["textures"]))
+        program = lit_at_hits(frame, candidates_program(self.kinds), bindings["textures"])
         passes.fullscreen(program, found, **bindings)
         return {name if "next" in name else f"candidate_{name}": image for name, image in zip(FOUND, found.colors)}
 

@@ -73,6 +73,9 @@ class ScatterPoints:
         self.cells: list[images.Image] = []
         # By row of instances: 1 + number of the object in front, or 0, and of that behind; then the objects.
         self.table: images.Image | None = None
+        self.grids: list[tuple] = []  # of each instance: corner and voxel's size; voxels, first of its texels
+        self.voxels = np.zeros((0, 4), np.float32)  # what `near` holds
+        self._materials = np.zeros(0)  # of each cell
         self.near: images.Image | None = None  # voxels: 1 + number of the cell that faces +x, -x, +y; -y, +z, -z
 
     def update(self, frame, most: int) -> bool:
@@ -106,11 +109,13 @@ class ScatterPoints:
 
     @property
     def instances(self) -> images.Image:
-        """z: row of a point's instance in the geometry's image, for all runs."""
+        """x: number of a point's object; z: row of its instance in the geometry's image; w: material; for all runs."""
         if self._instances is None:
             values = np.zeros((self.rows, ROW, 4), np.float32)
-            for one in self.objects:
+            for number, one in enumerate(self.objects):
+                values[one.first_row : one.first_row + one.rows, :, 0] = number
                 values[one.first_row : one.first_row + one.rows, :, 2] = one.instance
+            values[..., 3] = self._materials.reshape(-1, ROW)
             self._instances = images.upload(values)
         return self._instances
 
@@ -126,12 +131,14 @@ class ScatterPoints:
             fewest += [FEWEST_WALKED if by_walks else FEWEST] * (len(sides) - len(fewest))
         counts = _counts([one for _, one in sides], np.array(fewest), most)
         self.objects, blocks, row = [], [], 0
+        materials = []
         table = np.zeros((max(len(placed), 1), 4), np.float32)
         clouds: dict[int, list] = {}
         for (k, surface), count in zip(sides, counts):
             if not count or not surface.area > 0.0:
                 continue
             *block, triangle, uv, cloud = surface.cells(int(count))
+            materials.append(surface.materials[triangle[:, 0]])
             blocks.append((*block, _painted(surface.materials[triangle], uv, maps, snapshot.images)))
             spacing = float(np.sqrt(surface.area / count))
             rows = int(count) // ROW
@@ -150,7 +157,10 @@ class ScatterPoints:
         objects = np.array(listed, np.float32).reshape(-1, 4)
         self.table = images.upload_list(np.concatenate([table, objects]))
         texels = [grid.texels for grid in grids.values()]
-        self.near = images.upload_list(np.concatenate(texels) if texels else np.zeros((0, 4)))
+        self.voxels = np.concatenate(texels) if texels else np.zeros((0, 4), np.float32)
+        self.near = images.upload_list(self.voxels)
+        self.grids = [((*grid.low, grid.size), (*grid.shape, starts[k])) for k, grid in grids.items()]
+        self._materials = np.concatenate(materials) if materials else np.zeros(0)
         self.first_object = len(table)
         self._upload(blocks)
 

@@ -17,6 +17,7 @@ import numpy as np
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.picture import Frame
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..scene.culling import calls
 from ..scene.materials import SURFACE_IMAGES
@@ -58,7 +59,7 @@ class Reflectance:
         self.image.defines = (*owned, *(TURNED if _turns_normals(frame) else ()))
 
     def _update(self, frame: Frame) -> None:
-        keys = self._keys_of(frame)
+        keys = keys_of(frame)
         rows = -(-len(frame.materials.compiled) // COLUMNS)
         kept = self.image is not None and self.image.size == (COLUMNS, BANDS * rows)
         if not kept:
@@ -78,7 +79,9 @@ class Reflectance:
         for number, direction in enumerate(DIRECTIONS):
             for material in changed:
                 corner = (material % COLUMNS * SIDE, (2 * (material // COLUMNS) + number) * SIDE)
-                self._draw(frame, target, (*corner, SIDE, SIDE), material, direction)
+                program = frame.materials.surface_program(material)
+                constants = drawing_constants(STOCHASTIC, False)
+                draw_overview(frame, target, (*corner, SIDE, SIDE), material, direction, program, {}, constants)
         cells = [(k % COLUMNS, band * rows + k // COLUMNS, 1, 1) for k in changed for band in range(BANDS)]
         for viewport in cells if few else [None]:
             passes.fullscreen(
@@ -94,41 +97,47 @@ class Reflectance:
         for image in seen:
             images.pool.give(image)
 
-    @staticmethod
-    def _keys_of(frame: Frame) -> dict[int, object]:
-        prints, count = frame.materials.fingerprint(), len(frame.materials.compiled)
-        shown: dict[int, list] = {}
-        for draw in frame.geometry.draws:
-            shown.setdefault(draw.material, []).append((draw.batch.number, draw.first, draw.count))
-        return {
-            material: (
-                prints[material], prints[count:], shown[material],
-                frame.materials.around(material, frame.geometry),
-            )
-            for material in sorted(shown)
-        }  # fmt: skip
-
-    def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:
-        all_draws = frame.geometry.draws
-        own = some([k for k, draw in enumerate(all_draws) if draw.material == material], all_draws)
-        draws = [all_draws[k] for k in own]
-        program = frame.materials.surface_program(material)
-        shader = passes.get(program)
-        bindings, own_constants = frame.materials.drawing(material, program, frame.geometry.instances)
-        low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
-        bindings["blocks"]["film_view"] = Block(VIEW, **_values(overview(low, high, backward)))
-        with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
-            constants = {"first_instance": 0, **drawing_constants(STOCHASTIC, False), **own_constants}
-            shader.bind(**bindings, constants=constants)
-            for call in calls(all_draws, own):
-                shader.set_constant("first_instance", call.first)
-                passes.draw(shader, call.draw.batch, call.count)
-
     def release(self) -> None:
         if self.image is not None:
             self.image.defines = ()
             images.pool.give(self.image)
         self.image, self._keys = None, {}
+
+
+def keys_of(frame: Frame) -> dict[int, object]:
+    """By material that is shown: what its overview depends on."""
+    prints, count = frame.materials.fingerprint(), len(frame.materials.compiled)
+    shown: dict[int, list] = {}
+    for draw in frame.geometry.draws:
+        shown.setdefault(draw.material, []).append((draw.batch.number, draw.first, draw.count))
+    return {
+        material: (
+            prints[material], prints[count:], shown[material],
+            frame.materials.around(material, frame.geometry),
+        )
+        for material in sorted(shown)
+    }  # fmt: skip
+
+
+def draw_overview(
+    frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray, program: Program,
+    textures: dict[str, images.Image], constants: dict[str, object],
+) -> None:  # fmt: skip
+    """Draw all surfaces of a material over one another with its `program`, as seen from afar along `backward`."""
+    all_draws = frame.geometry.draws
+    own = some([k for k, draw in enumerate(all_draws) if draw.material == material], all_draws)
+    draws = [all_draws[k] for k in own]
+    shader = passes.get(program)
+    bindings, own_constants = frame.materials.drawing(material, program, frame.geometry.instances)
+    low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
+    bindings["textures"] = {**bindings["textures"], **textures}
+    bindings["blocks"]["film_view"] = Block(VIEW, **_values(overview(low, high, backward)))
+    with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
+        values = {"first_instance": 0, **constants, **own_constants}
+        shader.bind(**bindings, constants=values)
+        for call in calls(all_draws, own):
+            shader.set_constant("first_instance", call.first)
+            passes.draw(shader, call.draw.batch, call.count)
 
 
 def _values(view: dict) -> dict:

@@ -40,17 +40,19 @@ from ..frame.technique import MATERIAL, Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import diffusion
-from ..lighting import repeated_light, walked_light
+from ..lighting import leaving_light, repeated_light, walked_light
+from ..lighting.leaving_light import LeavingLight, LeavingService, sending
 from ..lighting.point_light import LIGHTING, PointLight
 from ..lighting.visibility import RAYS, ray_bindings
 from ..materials import translucency
-from ..materials.compiler import may_scatter
+from ..materials.compiler import may_scatter, may_walk
 from ..scene import acceleration
 from ..scene.materials import SCATTER_IMAGES
 from ..scene.scatter_points import RANGE, ROW, ScatterPoints
 from ..scene.view import VIEW
 from ..snapshot.scene import Note, Snapshot
 from ..surfaces.draw import SURFACES, draw_scatter
+from ..surfaces.scatter_means import ScatterMeans
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
 
 RAYS_INDIRECT = 4  # of a point in a sample
@@ -155,6 +157,8 @@ class ImageSpaceSubsurface(Technique):
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
         self._shapes: images.Image | None = None  # of cells: normal, depth, mean length of lines through
+        self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
+        self._leaving, self._leaving_sample = LeavingLight(), -1
         self._met: tuple[int, int] | None = None  # what the rays of these have met
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -164,7 +168,7 @@ class ImageSpaceSubsurface(Technique):
         return acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return GATHER, APPLY, CHORD, LIGHTING, *walked_light.PROGRAMS
+        return GATHER, APPLY, CHORD, LIGHTING, *walked_light.PROGRAMS, *leaving_light.PROGRAMS
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._materials or frame.receivers is None or not len(frame.receivers.distance):
@@ -174,6 +178,7 @@ class ImageSpaceSubsurface(Technique):
         repeated_light.forbid(frame)
         draw_scatter(frame, self, frame.target(*IMAGES), self.points.table, self._materials)
         lit = self._lit_points(frame) if self.points.rows else None
+        self._direct = None
         yield
         yield from self._gather(frame, lit)
         for image in lit or ():
@@ -200,6 +205,13 @@ class ImageSpaceSubsurface(Technique):
         self._whole = [images.Target((images.pool.take(*frame.size, "RGBA32F"),)) for _ in range(2)]
         self._whole[0].clear()
         self._light.begin(frame)
+        self._leaving_sample, self._direct = -1, None
+        walked = [k for k in self._materials if may_walk(frame.snapshot.materials[k].graph)]
+        if walked and self.points.rows:
+            frame.kept(ScatterMeans).update(frame, walked)
+            if moved or self._leaving.image is None:
+                self._leaving.update(self.points, walked)
+            frame.provide(LeavingService(lambda: self._leaving_image(frame)))
         frame.count(self, "points", self.points.rows * ROW)
         frame.count(self, "objects", len(self.points.objects))
 
@@ -223,10 +235,18 @@ class ImageSpaceSubsurface(Technique):
     # Light at points of the mesh --------------------------------------------------------------------------------------
 
     def _lit_points(self, frame: Frame) -> tuple[images.Image, images.Image]:
-        """Direct and indirect light of this sample at the points, as surfaces of the painted tint
-        there reflect it."""
+        """Direct and indirect light of this sample at the points, as surfaces of the painted tint there reflect it."""
+        direct = self._directly_lit(frame)
+        indirect = images.pool.take(*direct.size, "RGBA32F")
+        self._light_indirectly(frame, *self.points.surface(frame.sample), indirect)
+        return direct, indirect
+
+    def _directly_lit(self, frame: Frame) -> images.Image:
+        """Direct light of this sample at the points; `_direct` keeps it until the sample's end."""
+        if self._direct is not None and self._direct[0] == frame.sample:
+            return self._direct[1]
         size = (ROW, self.points.rows)
-        direct, unused, indirect = (images.pool.take(*size, "RGBA32F") for _ in range(3))
+        direct, unused = (images.pool.take(*size, "RGBA32F") for _ in range(2))
         position, normal = self.points.surface(frame.sample)
         target = images.Target((direct, unused))
         target.clear()
@@ -238,8 +258,23 @@ class ImageSpaceSubsurface(Technique):
         frame.count(self, "passes", drawn)
         images.pool.give(unused)
         frame.count(self, "rays", rays * ROW * self.points.rows)
-        self._light_indirectly(frame, position, normal, indirect)
-        return direct, indirect
+        self._direct = frame.sample, direct
+        return direct
+
+    def _leaving_image(self, frame: Frame) -> images.Image | None:
+        """What leaves the points' surfaces in this sample, for others; None where nothing is drawn."""
+        if self._leaving_sample != frame.sample:
+            direct = self._directly_lit(frame)
+            self._leaving.draw(
+                frame, self.points,
+                {
+                    "cell_direct": direct, "cell_shapes": self._shapes, "walk_lobes": self._lobes,
+                    "scatter_means": frame.kept(ScatterMeans).image,
+                },
+            )  # fmt: skip
+            self._leaving_sample = frame.sample
+            frame.count(self, "passes", 2)
+        return self._leaving.image
 
     def _light_indirectly(self, frame: Frame, position, normal, indirect: images.Image) -> None:
         target = images.Target((indirect,))
@@ -248,12 +283,14 @@ class ImageSpaceSubsurface(Technique):
             target.clear()
             return
         offered = provided.bindings
+        textures = {name: offered["textures"][name] for _, name in GATHER_TEXTURES}
+        program = sending(frame, INDIRECT, textures)
         names = {name for _, name in GATHER_CONSTANTS} - {"lobe_rays"}
         passes.fullscreen(
-            INDIRECT, target,
+            program, target,
             textures={
-                **{name: offered["textures"][name] for _, name in GATHER_TEXTURES},
-                "point_position": position, "point_normal": normal, "point_entry": self.points.entries(frame.sample),
+                **textures, "point_position": position, "point_normal": normal,
+                "point_entry": self.points.entries(frame.sample),
             },
             blocks=offered["blocks"],
             constants={**{name: offered["constants"][name] for name in names}, "rays": RAYS_INDIRECT},
@@ -347,4 +384,5 @@ class ImageSpaceSubsurface(Technique):
         self._give_whole()
         self._give_white()
         self._give_shapes()
-        self._lobes = self._met = None
+        self._leaving.release()
+        self._lobes = self._met = self._direct = None

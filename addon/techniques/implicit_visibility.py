@@ -43,8 +43,8 @@ from ..gfx import images, passes
 from ..gfx.interface import answered
 from ..gfx.library import Program
 from ..lighting import surfels as surfel_light
-from ..lighting.linked import linked_at_hits
-from ..lighting.media import MEDIA, MediaService, dimmed
+from ..lighting.leaving_light import lit_at_hits
+from ..lighting.media import MEDIA, MediaService
 from ..lighting.surfels import SurfelLight
 from ..lighting.virtual_lights import VirtualLights
 from ..scene import acceleration
@@ -282,7 +282,7 @@ class ImplicitVisibility(Technique):
         self._glossy.draw_sources(frame)
         bindings = self._glossy.path_bindings(frame)
         bindings["constants"] |= {"fan_count": 0, "step_count": 0, "farthest": 0.0, "thickness": 0.0}
-        program = linked_at_hits(frame, dimmed(frame, GLOSSY, bindings["textures"]))
+        program = lit_at_hits(frame, GLOSSY, bindings["textures"])
         target = frame.target("radiance.glossy_indirect", depth=MARKS)
         for rows in frame.bands(self, "gloss"):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)

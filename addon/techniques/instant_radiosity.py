@@ -45,8 +45,7 @@ from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from ..lighting.linked import linked_at_hits
-from ..lighting.media import dimmed
+from ..lighting.leaving_light import lit_at_hits
 from ..lighting.path_sources import shaded_roughness
 from ..lighting.virtual_lights import (
     PATH_BLOCKS,
@@ -212,7 +211,7 @@ class InstantRadiosity(Technique):
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
         bindings["textures"] = dict(bindings["textures"])  # not of those who gather these lights, too
         program = gather_program(self.virtual_lights.kinds, *lobes_of(frame))
-        program = linked_at_hits(frame, dimmed(frame, program, bindings["textures"]))
+        program = lit_at_hits(frame, program, bindings["textures"])
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield

@@ -42,7 +42,7 @@ from ..frame.technique import Param
 from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..kernels import lists
-from ..lighting.linked import linked_at_hits
+from ..lighting.leaving_light import lit_at_hits
 from ..lighting.media import dimmed
 from ..lighting.virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 from ..scene.view import VIEW
@@ -142,6 +142,7 @@ def regions(gather: Gather, listed: bool = True) -> Program:
         snippets=(("generated/gather", f'#include "{gather.file}"\n'),),
         defines=(*RUNS, *gather.defines, *(() if listed else (("BY_LEVEL", ""),))),
         group=(lists.RUN, 1, 1),
+        leaves_out=(("leaving", "regions gather virtual lights and look at no surface that sends light"),),
     )
 
 
@@ -206,7 +207,7 @@ class MultiresRadiosity(InstantRadiosity):
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
         program = shared_gather_program(self.virtual_lights.kinds, *lobes_of(frame))
-        program = linked_at_hits(frame, dimmed(frame, program, bindings["textures"]))
+        program = lit_at_hits(frame, program, bindings["textures"])
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield

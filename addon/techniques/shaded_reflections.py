@@ -40,6 +40,7 @@ from ..gfx.library import Program
 from ..lighting import caustic_maps
 from ..lighting.caustic_maps import CausticMaps
 from ..lighting.interfaces import clear_roughness
+from ..lighting.leaving_light import sending
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import CANDIDATES
 from ..lighting.media import LightOfMedia, MediaService, Rays, dimmed
@@ -411,7 +412,8 @@ class ShadedReflections(Technique, BothWays):
         if provided is not None:
             near = {name: provided.bindings["constants"][name] for name in near}
             textures = {name: provided.bindings["textures"][name] for name in textures}
-        program = dimmed(frame, received_program(transmission, frame.materials.soft), textures)
+        program = sending(frame, received_program(transmission, frame.materials.soft), textures)
+        program = dimmed(frame, program, textures)
         passes.fullscreen(
             program,
             self._target(transmission, ("indirect",), records.target.depth),

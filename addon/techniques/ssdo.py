@@ -40,8 +40,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting.linked import linked_at_hits
-from ..lighting.media import dimmed
+from ..lighting.leaving_light import lit_at_hits
 from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -194,7 +193,7 @@ class ScreenSpaceBounce(Technique):
         return bindings
 
     def _in_bands(self, frame: Frame, program: Program, target, bindings: dict, blend="NONE") -> Iterator[None]:
-        program = linked_at_hits(frame, dimmed(frame, program, bindings["textures"]))
+        program = lit_at_hits(frame, program, bindings["textures"])
         for rows in frame.bands(self):
             passes.fullscreen(program, target, rows=rows, blend=blend, **bindings)
             yield

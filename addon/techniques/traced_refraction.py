@@ -74,7 +74,10 @@ REFRACTION = passes.fullscreen_program(
         ("FLOAT", "emissive_points"), ("FLOAT", "clear_roughness"), *NEAR_CONSTANTS,
     ),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
-    leaves_out=(("media", "the walk among means crosses insides of glass, which are no media of the scene"),),
+    leaves_out=(
+        ("media", "the walk among means crosses insides of glass, which are no media of the scene"),
+        ("leaving", "the walk among means knows no object, but the mean of its material"),
+    ),
 )  # fmt: skip
 # Where shaded_reflections.py follows what the first interface lets pass, lamps and the world are left:
 FIRST_ALONE = replace(

@@ -154,9 +154,19 @@ void main()
   r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,
                             r.surface.glossy_tint, r.surface.glossy_edge.x > 0.5, r.surface.glossy_weight, vec3(0.0));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + ray_number);
-  vec3 sum = vec3(0.0);
+  // Light from below the surface takes the place of what a diffuse one would send.
+  vec3 diffuse = r.surface.diffuse;
+  vec3 sent;
+  vec3 part;
+  vec3 same;
+  bool leaves = light_leaves(-1, r.surface.position, r.surface.geometric_normal, roll.y, sent, part, same);
+  vec3 straight = leaves ? diffuse * (vec3(1.0) - part) : diffuse;
+  vec3 onward = leaves ? diffuse * (vec3(1.0) - part * (vec3(1.0) - same)) : diffuse;
+  vec3 sum = leaves ? float(repeats) * diffuse * part * sent : vec3(0.0);
   for (int k = 0; k < repeats; k++) {
+    r.surface.diffuse = straight;
     sum += direct_light(r, roll.x);
+    r.surface.diffuse = onward;
     roll = hash3(roll);
     if (glossy_radius > 0.0 && r.mirrored < bounces) {
       sum += indirect_light(r, roll);

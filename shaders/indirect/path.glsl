@@ -9,6 +9,7 @@
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
 #include "ask/media.glsl"
+#include "ask/leaving.glsl"
 
 #define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
 #define LAYERS_PASSED 16     // surfaces that a ray to a light goes through that they do not block
@@ -19,6 +20,8 @@ struct Vertex {
   vec3 lit;     // the same, or on the other side: that from which light reaches it
   vec3 turned;  // that, as normal maps and bumps turn it: light straight from sources is reflected by it
   Reflection reflection;
+  vec3 leaving;  // radiance of direct light that entered elsewhere
+  vec3 straight; // of the diffuse albedo, what direct light is reflected by here
 #ifdef HIT_LINKS
   int group;    // of receivers (addon/snapshot/linking.py)
 #endif
@@ -141,6 +144,16 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   int material = triangle_material(hit);
   met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
 #endif
+  vec3 part;
+  vec3 same;
+  met.leaving = vec3(0.0);
+  met.straight = vec3(1.0);
+  if (light_leaves(triangle_material(hit), met.position, met.normal, salt, met.leaving, part, same)) {
+    vec3 onward = vec3(1.0) - part * (vec3(1.0) - same);
+    met.leaving *= part * met.reflection.diffuse;
+    met.straight = (vec3(1.0) - part) / max(onward, vec3(1e-6));
+    met.reflection.diffuse *= onward;
+  }
   met.lit = met.normal;
   float through = met.reflection.through;
   if (through > 0.0) {
@@ -233,7 +246,9 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
   vec3 origin = ray_origin(position, met.lit);
   vec3 off = normal - met.lit;
   float bump = (dot(off, off) > 1e-10) ? bump_squared(met.lit, normal) : 0.0;
-  vec3 sum = vec3(0.0);
+  vec3 sum = met.leaving;
+  Reflection reflection = met.reflection;
+  reflection.diffuse *= met.straight;
   uint roll = salt;
   for (int group = 0; group < min(light_rays, light_count); group++) {
     float total = 0.0;
@@ -268,7 +283,6 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
       chosen_light *= passing_media(origin, chosen_direction, light_distance(light, origin, chosen_direction), salt);
-      Reflection reflection = met.reflection;
 #ifdef MIRRORS_OWNED
       if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
         reflection.straight = reflection.grazing = vec3(0.0);

@@ -1,0 +1,147 @@
+"""Light that leaves surfaces below which it scatters, for whoever sees them but the camera: bounces, mirrors, fog.
+
+Once a sample, when somebody asks, walks from each point of the mesh (scene/scatter_points.py) find what leaves there of
+the direct light of all points. With a grid of voxels around each object this stands in one list, an image, so that rays
+find it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. Of
+indirect light they send on what leaves on the side where it came from.
+
+| cost | per sample |
+|---|---|
+| rays | a point: `walks` times about 2 / (1 - albedo)^(1/2) + 2 |
+| passes | 2 |
+| bytes | 64 a point, up to 32 for each of 64^3 voxels an instance |
+
+Bias: even over a point's cell; colours and radii are the means of their material; of indirect light what leaves on the
+other side is lost. Burley's method sends as a diffuse surface does: so it does in Cycles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..frame.picture import Frame
+from ..frame.technique import Service
+from ..gfx import images, passes
+from ..gfx.interface import Interface, answered, asked_by
+from ..gfx.library import Program
+from ..scene import acceleration
+from ..scene.scatter_points import RANGE, ROW, ScatterPoints
+from ..scene.view import VIEW
+from ..surfaces.hits import Hits
+from .linked import linked_at_hits
+from .media import dimmed
+from .walked_light import FEW_WALKS
+
+LEAST_WALKS = 2  # of a point in a sample
+WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 4, images.LIST_WIDTH
+LEFT = ("sent", "part", "same")
+LEAVING = passes.fullscreen_program(
+    "light that leaves points",
+    "subsurface/leaving.frag.glsl",
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES,
+        ("RG32F", "trace_owners"),
+        *(("RGBA32F", name) for name in (
+            "point_position", "point_normal", "point_instances", "cell_direct", "cell_shapes", "scatter_objects",
+            "scatter_near", "scatter_means", "walk_lobes", "surface_position",
+        )),
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size")),
+    defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
+    outputs=tuple(("VEC4", f"out_{name}") for name in LEFT),
+)  # fmt: skip
+LIST = passes.fullscreen_program(
+    "list of light that leaves points",
+    "subsurface/leaving_list.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in (*(f"cell_{name}" for name in LEFT), "point_position")),
+    outputs=(("VEC4", "out_texel"),),
+)
+PROGRAMS = (LEAVING, LIST)
+
+
+@dataclass(frozen=True)
+class LeavingService(Service):
+    """What leaves surfaces in the sample that runs; `image` makes it when first asked."""
+
+    name = "light that leaves surfaces"
+    image: Callable[[], images.Image | None]
+
+
+def _leaving(frame: Frame) -> dict[str, images.Image] | None:
+    service = frame.service(LeavingService)
+    image = None if service is None else service.image()
+    return None if image is None else {"leaving_light": image}
+
+
+LEAVES = Interface("leaving", "subsurface/leaving.glsl", (("RGBA32F", "leaving_light"),), _leaving)
+
+
+def sending(frame: Frame, program: Program, textures: dict[str, images.Image]) -> Program:
+    """The same pass of shaders/indirect/path.glsl, for surfaces that send light from below, if the frame has any; its
+    image is added to `textures`."""
+    found = LEAVES.present(frame) if LEAVES.asked in asked_by(program) else None
+    if found is None:
+        return program
+    textures |= found
+    return answered(program, (LEAVES,))
+
+
+def lit_at_hits(frame: Frame, program: Program, textures: dict[str, images.Image]) -> Program:
+    """The same pass of shaders/indirect/path.glsl, for all that the frame has: media, light from below surfaces, links.
+    Images of these are added to `textures`."""
+    return linked_at_hits(frame, sending(frame, dimmed(frame, program, textures), textures))
+
+
+class LeavingLight:
+    """The list of a picture. `update` when points have changed, `draw` in each sample."""
+
+    def __init__(self):
+        self.image: images.Image | None = None
+        self._rows = 0  # of the image, that points take
+
+    def update(self, points: ScatterPoints, walked: Any) -> None:
+        """Lay out the list for these points. `walked`: numbers of the materials whose light is walked."""
+        self._rows = -(-points.rows * ROW * CELL_TEXELS // WIDTH)
+        cells = np.zeros((self._rows * WIDTH, 4), np.float32)
+        first = FIRST_CELL + len(cells)
+        instances = np.array([row for grid in points.grids for row in grid], np.float32).reshape(-1, 4)
+        head = np.zeros((WIDTH, 4), np.float32)
+        head[0] = first, len(instances) // 2, first + len(instances), 0
+        flags = head[1:].reshape(-1)
+        flags[[k for k in walked if k < len(flags)]] = 1.0
+        self.image = images.upload_list(np.concatenate([head, cells, instances, points.voxels]))
+
+    def draw(self, frame: Frame, points: ScatterPoints, textures: dict[str, images.Image]) -> None:
+        """Find what leaves in this sample. `textures`: cell_direct, cell_shapes, scatter_means and walk_lobes."""
+        hierarchy = frame.hierarchy("shadow")
+        owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
+        position, normal = points.surface(frame.sample)
+        left = [images.pool.take(ROW, points.rows, "RGBA32F") for _ in LEFT]
+        passes.fullscreen(
+            LEAVING, images.Target(tuple(left)),
+            textures={
+                **hierarchy.textures, **textures, "trace_owners": owners, "point_position": position,
+                "point_normal": normal, "point_instances": points.instances, "scatter_objects": points.table,
+                "scatter_near": points.near, "surface_position": frame.images["surface.position"],
+            },
+            blocks={"film_view": frame.view_block},
+            constants={
+                "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
+                "walks": 1 if frame.settings.draft else max(FEW_WALKS // frame.settings.samples, LEAST_WALKS),
+            },
+        )  # fmt: skip
+        passes.fullscreen(
+            LIST, images.Target((self.image,)), viewport=(0, 1, WIDTH, self._rows),
+            textures={**{f"cell_{name}": image for name, image in zip(LEFT, left)}, "point_position": position},
+        )  # fmt: skip
+        for image in left:
+            images.pool.give(image)
+
+    def release(self) -> None:
+        """Drop GPU resources."""
+        self.__init__()

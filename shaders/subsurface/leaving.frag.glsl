@@ -1,0 +1,97 @@
+// What light below the surface leaves objects at their points, for whoever sees them but the camera (lighting/leaving_light.py): by
+// walks from each point, entered from directions of the cosine's density. For albedo 1:
+//
+//   sent  radiance, of the direct light of points
+//   part  share of the diffuse albedo that scatters and that walks find; the rest is as a diffuse surface
+//   same  of light that arrives evenly at the side on which the point lies, how much leaves there again
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "subsurface/walks.glsl"
+#include "subsurface/walked.glsl"
+
+vec3 sent_so_far;
+vec3 same_so_far;
+vec3 left_so_far;
+vec3 entered_normal;
+float points_spacing;
+float translucent;
+vec4 grid;
+vec4 voxels;
+
+void walk_leaves(vec3 weight, vec3 place, vec3 facing, vec2 u)
+{
+  left_so_far += weight;
+  same_so_far += weight * smoothstep(-0.2, 0.4, dot(facing, entered_normal));
+  int cell = cell_near(beside(place, facing, points_spacing, u.x, u.y), facing, grid, voxels);
+  if (cell >= 0) {
+    ivec2 texel = ivec2(cell & (ROW - 1), cell / ROW);
+    sent_so_far += weight * min(cell_shapes_fetch(texel).w, translucent) * cell_direct_fetch(texel).rgb;
+  }
+}
+
+#include "subsurface/walk_below.glsl"
+
+void main()
+{
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  out_sent = vec4(0.0);
+  out_part = vec4(0.0);
+  out_same = vec4(0.0);
+  vec4 place = point_position_fetch(texel);
+  vec4 belongs = point_instances_fetch(texel);
+  int material = int(belongs.w + 0.5);
+  int rows = scatter_means_size().y / 3;
+  ivec2 at = ivec2(material & 15, material >> 4);
+  vec4 length_m = scatter_means_fetch(at);
+  vec4 color = scatter_means_fetch(at + ivec2(0, rows));
+  vec4 share = scatter_means_fetch(at + ivec2(0, 2 * rows));
+  int method = int(length_m.w + 0.5);
+  if (place.w == 0.0 || method == SCATTER_BURLEY || !(max_component(share.rgb) > 0.0)) {
+    return;
+  }
+  int listed = first_object + OBJECT_TEXELS * int(belongs.x + 0.5);
+  vec4 object = object_texel(listed);
+  grid = object_texel(listed + 1);
+  voxels = object_texel(listed + 2);
+  vec4 shape = cell_shapes_fetch(texel);
+  float part = walked_part(profile_of(PROFILE_WALK, length_m.xyz, color.rgb), object, 0.0, shape.y);
+  if (part <= 0.0) {
+    return;
+  }
+  vec4 normals = point_normal_fetch(texel);
+  entered_normal = octahedral_decode(normals.xy);
+  vec3 face = octahedral_decode(normals.zw);
+  vec3 start = ray_origin(place.xyz, -face);
+  points_spacing = object.z;
+  translucent = shape.w;
+  sent_so_far = same_so_far = left_so_far = vec3(0.0);
+  Below below = below_of(object.w, color.rgb, length_m.xyz);
+  uvec3 roll = roll_of(texel, film_view.sample_index, film_view.seed, 239);
+  uvec3 salt1 = roll_of(texel >> 2, 0, film_view.seed, 241);
+  uvec3 salt2 = hash3(salt1);
+  uvec3 salt3 = hash3(salt2);
+  uvec3 salt4 = hash3(salt3);
+  uvec3 salt5 = hash3(salt4);
+  uvec3 salt6 = hash3(salt5);
+  uvec3 salt7 = hash3(salt6);
+  Even even;
+  even.scattered = salt3.xy;
+  even.polar = salt4.xy;
+  even.azimuth = salt5.xy;
+  vec3 rest = vec3(0.0);
+  for (int walk = 0; walk < walks; walk++) {
+    even.index = (film_view.sample_index * walks + walk) * 16 + (texel.x & 3) + 4 * (texel.y & 3);
+    vec2 u = vec2(shuffled(even.index, salt1.xy), shuffled(even.index, salt2.xy));
+    vec2 v = vec2(shuffled(even.index, salt6.xy), shuffled(even.index, salt7.xy));
+    vec3 view = cosine_direction(entered_normal, v);
+    vec3 direction = entry_direction(entered_normal, view, color.w, share.w, method == SCATTER_SKIN, u);
+    if (dot(direction, face) < 0.0) {
+      rest += walk_below(below, start, direction, even, roll);
+    }
+  }
+  rest *= walk_rest(color.rgb);
+  vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / (max(color.rgb, vec3(1e-3)) * float(walks));
+  out_sent = vec4(sent_so_far * norm, 0.0);
+  out_part = vec4(part * share.rgb, 0.0);
+  out_same = vec4(same_so_far * norm, 0.0);
+}
