@@ -80,5 +80,5 @@ def reach(frame: Frame, media: Media) -> tuple[float, float]:
             away = 0.0
         near = min(near, away)
         far = max(far, np.linalg.norm(np.maximum(np.abs(low - eye), np.abs(high - eye))))
-    near = near if np.isfinite(near) else 0.0
+    near = max(near, camera.clip_start) if np.isfinite(near) else camera.clip_start
     return float(near), float(max(far, near * 1.001, 1e-20))

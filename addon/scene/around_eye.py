@@ -2,7 +2,8 @@
 
 A walk through glass takes away what the inside absorbs from interface to interface (techniques/traced_refraction.py);
 the first stretch of each view ray, up to the first surface, belongs to the solid that the eye is in. As Cycles does, a
-ray straight up tells: the eye is in each object of which that ray meets the back first, closed or not.
+ray straight up tells: the eye is in each object of which that ray meets the back first, closed or not. It starts where
+view rays begin, at the camera's clip start.
 
 Bias: one place for all of the picture: an orthographic camera half in water counts by its middle.
 """
@@ -25,7 +26,8 @@ def absorbed_around_eye(snapshot: Snapshot, compiled: Sequence[CompiledMaterial]
     absorbing = [bool(one.glass and one.medium and np.any(one.medium.absorption > 0)) for one in compiled]
     if snapshot.camera is None or not any(absorbing):
         return total
-    eye = snapshot.camera.matrix[:3, 3]
+    camera = snapshot.camera
+    eye = camera.matrix[:3, 3] - camera.clip_start * camera.matrix[:3, 2]
     for one in snapshot.instances:
         if not any(absorbing[k] for k in one.materials) or not np.isfinite(one.matrix).all():
             continue

@@ -31,7 +31,7 @@ void main()
   }
   float off = length(position - ray.origin - along_view * ray.direction);
   float pixel_size = abs(film_view.frame.y - film_view.frame.x) / film_view.film.x;
-  pixel_size *= (film_view.eye.w > 0.5) ? 1.0 : along_view * max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
+  pixel_size *= (film_view.eye.w > 0.5) ? 1.0 : (ray.before + along_view) * max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
   float wide = clamp(beam_flux.w, beam_pixels * pixel_size, beam_most_pixels * pixel_size);
   float tent = max(1.0 - off / wide, 0.0) / wide;
   if (!(tent > 0.0)) {

@@ -367,8 +367,8 @@ void main()
   vec2 place = froxel_pixel(cell, vec2(media_random(seed), media_random(seed)));
   ivec2 pixel = clamp(ivec2(place), ivec2(0), size - 1);
   ViewRay ray = view_ray(surface_position_fetch(pixel), vec2(pixel) + 0.5);
-  float away = froxel_distance(float(cell.z) + media_random(seed));
-  if (away >= ray.limit) {
+  float away = froxel_distance(float(cell.z) + media_random(seed)) - ray.before;
+  if (away < 0.0 || away >= ray.limit) {
     return;
   }
   Start start = start_at(ray.origin + away * ray.direction, -ray.direction);

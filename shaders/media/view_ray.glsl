@@ -1,4 +1,4 @@
-// The view ray of a pixel, up to the surface that it sees.
+// The view ray of a pixel, from the camera's clip start, where Cycles' rays begin, up to the surface that it sees.
 #include "film/view_direction.glsl"
 
 struct ViewRay {
@@ -6,6 +6,7 @@ struct ViewRay {
   vec3 direction;
   float limit;  // distance of the surface; FARTHEST_MEDIUM where there is none
   bool hit;
+  float before;  // distance of its origin from the eye
 };
 
 // `seen`: of the image of positions; `place`: on the film, in pixels.
@@ -29,5 +30,8 @@ ViewRay view_ray(vec4 seen, vec2 place)
       ray.limit = length(away);
     }
   }
+  ray.before = film_view.film.z / max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
+  ray.origin += ray.before * ray.direction;
+  ray.limit = max(ray.limit - ray.before, 0.0);
   return ray;
 }

@@ -46,16 +46,20 @@ def test_fog_takes_light_on_both_legs_of_its_way(stage):
     fog(stage, node="ShaderNodeVolumeAbsorption", Color=(0.5, 0.5, 0.5, 1), Density=0.2)
     images_seen = stage.render(size=(8, 8))
     light = images_seen["combined"][4, 4, 0]
-    assert light == pytest.approx(clear * np.exp(-0.1 * (2 + 4)), rel=2e-3)
+    assert light == pytest.approx(clear * np.exp(-0.1 * (2 + 4 - camera.data.clip_start)), rel=2e-3)
     # The light pass is divided by the colour that is seen, as in Cycles: it has lost on one leg only.
     assert images_seen["diffuse_direct"][4, 4, 0] == pytest.approx(clear * np.exp(-0.1 * 2), rel=2e-3)
 
 
 def test_a_camera_inside_a_medium_sees_what_is_left_from_there(stage):
-    stage.camera((0, 0, 0.25), (0, 0, 0), angle=0.1)
+    """From the camera's clip start on, where Cycles' rays begin."""
+    camera = stage.camera((0, 0, 0.25), (0, 0, 0), angle=0.1)
     glowing_floor(stage)
     box(stage, absorber(stage, (0.8, 0.8, 0.8)))
-    assert stage.render(size=(8, 8))["combined"][4, 4, 0] == pytest.approx(2 * np.exp(-0.8 * 0.75), rel=1e-3)
+    for start in (0.05, 0.3, 0.75):
+        camera.data.clip_start = start
+        seen = stage.render(size=(8, 8))["combined"][4, 4, 0]
+        assert seen == pytest.approx(2 * np.exp(-0.8 * (0.75 - start)), rel=1e-3)
 
 
 def test_a_camera_on_a_boundary_sees_a_slab_or_none(stage):
@@ -94,7 +98,7 @@ def test_the_fog_around_the_camera_stays_however_much_stands_in_it(stage):
     for x in range(7):
         box(stage, made, location=(2.0 * x + 1, 0, 0))
     stage.camera((0, 0, 0), (np.pi / 2, 0, -np.pi / 2), angle=0.05)
-    assert stage.render(size=(8, 8))["combined"][..., 0] == pytest.approx(np.exp(-0.05 * 20 - 0.007), rel=3e-3)
+    assert stage.render(size=(8, 8))["combined"][..., 0] == pytest.approx(np.exp(-0.05 * (20 - 0.1) - 0.007), rel=3e-3)
 
 
 # Light of media -----------------------------------------------------------------------------------------------------
@@ -179,7 +183,7 @@ def airlight(origin, direction, far, light, intensity, scattering, extinction, s
 @pytest.mark.parametrize(("samples", "mean_error", "pixel_error"), [(64, 0.01, 0.05), (1, 0.05, 0.10)])
 def test_airlight_of_a_point_light_is_its_integral(stage, samples, mean_error, pixel_error):
     """With one sample, too: the peak at the lamp, which the camera sees, is not spread over its neighbours."""
-    stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.8)
+    start = stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.8).data.clip_start
     stage.light("POINT", (0.3, 0.5, 0.2), energy=4 * np.pi**2, shadow_soft_size=0.0)  # intensity pi W/sr
     fog(stage, Color=(0.75, 0.75, 0.75, 1), Density=0.2)
     box_far = stage.rectangle((-50, -50), (50, 50), material=stage.diffuse(0.0), location=(0, 10, 0))
@@ -190,10 +194,11 @@ def test_airlight_of_a_point_light_is_its_integral(stage, samples, mean_error, p
     for y, up in enumerate(place):
         for x, right in enumerate(place):
             direction = np.array([right, 1.0, up])
-            far = 16.0 * np.linalg.norm(direction)
+            far = (16.0 - start) * np.linalg.norm(direction)
+            eye = np.array([0, -6.0, 0]) + start * direction
             direction /= np.linalg.norm(direction)
             light = np.array([0.3, 0.5, 0.2])
-            expected[y, x] = airlight(np.array([0, -6.0, 0]), direction, far, light, np.pi, 0.15, 0.15)
+            expected[y, x] = airlight(eye, direction, far, light, np.pi, 0.15, 0.15)
     # Volume Scatter absorbs nothing: extinction is scattering.
     assert fog_light.mean() == pytest.approx(expected.mean(), rel=mean_error)
     assert np.abs(fog_light / expected - 1).mean() < pixel_error
@@ -452,7 +457,7 @@ def test_a_change_of_fog_alone_begins_the_picture_anew(stage):
     thin = stage.render(size=(8, 8))["combined"][0, 0, 0]
     node = next(n for n in stage.scene.world.node_tree.nodes if n.type == "VOLUME_ABSORPTION")
     node.inputs["Density"].default_value = 0.2
-    assert stage.render(size=(8, 8))["combined"][0, 0, 0] == pytest.approx(thin * np.exp(-1.2), rel=1e-2)
+    assert stage.render(size=(8, 8))["combined"][0, 0, 0] == pytest.approx(thin * np.exp(-0.1 * (12 - 0.1)), rel=2e-3)
 
 
 @pytest.mark.slow
@@ -536,18 +541,21 @@ def test_denoising_keeps_the_light_of_a_shaft_and_takes_its_noise(stage):
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_a_camera_in_water_sees_what_the_water_leaves(stage, turn):
-    """What stands in it through one stretch, what stands behind its face through that and the interface."""
+    """What stands in it through one stretch, what stands behind its face through that and the interface. Both begin at the
+    camera's clip start, as in Cycles."""
     water = stage.material("ShaderNodeBsdfGlass", IOR=1.33, Roughness=0.0)
     fill(water.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.1, 0.6, 0.8, 1), Density=0.5)
-    stage.camera((0, 0, 0), (0, 0, 0), angle=0.02)  # looks down
+    camera = stage.camera((0, 0, 0), (0, 0, 0), angle=0.02)  # looks down
+    camera.data.clip_start = start = 0.2
     wall = glowing_floor(stage, z=-1.5, strength=1.0)
     box(stage, water, (-1, -1, -1), (1, 1, 1), turn=(0, 0, turn))
     absorbed = 0.5 * np.array([0.9, 0.4, 0.2])
     seen = stage.render(4, size=(8, 8))["combined"][..., :3].mean(axis=(0, 1))
     interface = 1 - ((1.33 - 1) / (1.33 + 1)) ** 2
-    assert seen == pytest.approx(interface * np.exp(-absorbed), rel=0.01)  # what is mirrored is chosen at random
+    assert seen == pytest.approx(interface * np.exp(-(1 - start) * absorbed), rel=0.01)  # what is mirrored is chosen at random
     wall.location.z = 0.9  # in the water, 0.6 m below the camera
-    assert stage.render(1, size=(8, 8))["combined"][4, 4, :3] == pytest.approx(np.exp(-0.6 * absorbed), rel=1e-3)
+    seen = stage.render(1, size=(8, 8))["combined"][4, 4, :3]
+    assert seen == pytest.approx(np.exp(-(0.6 - start) * absorbed), rel=1e-3)
 
 
 def test_air_is_lit_by_the_meshes_that_volumes_may_see(stage):
