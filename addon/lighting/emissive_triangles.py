@@ -18,18 +18,19 @@ LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
 MOST_ASKED = 512  # triangles whose distance from what is lit is measured
 TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
-PATHS["volume"] = lights.DIFFUSE_FLAG  # media ask for no flag: their lights are those that they see
+PATHS["volume"] = 0  # media ask for no flag: their lights are those that they see
 
 
 class EmissiveTriangles:
     """World-space triangles that emit, ready to draw points from; of objects that any of these paths (names of
-    Visibility) may see. As in Cycles, an object lights what its ray visibility says.
+    Visibility) may see, `without` those that another one sees. As in Cycles, an object lights what its ray visibility
+    says. What media see has the flag of diffuse light where surfaces see it, too.
 
     They stand along a space-filling curve, so that points drawn by well-spread numbers are spread in space: in the
     order of the meshes, rows of a ball or lamps of a room would get no point in a picture of few samples.
     """
 
-    def __init__(self, frame: Frame, paths: Sequence[str]):
+    def __init__(self, frame: Frame, paths: Sequence[str], without: str | None = None):
         corners, radiance, normals, sided, flags = [], [], [], [], []
         self.unlit: list[int] = []  # by triangle, see lights.unlit_bits
         self.passing: list[frozenset[int]] = []  # by triangle: groups of blockers that let its light pass
@@ -39,8 +40,11 @@ class EmissiveTriangles:
         emissive = {k for k, material in enumerate(frame.measured_materials) if material.emissive}
         for instance in frame.snapshot.instances:
             mesh = frame.snapshot.meshes[instance.mesh]
-            seen = sum(PATHS[path] * getattr(instance.visibility, path) for path in paths)
-            if not seen or emissive.isdisjoint(instance.materials) or not mesh.triangle_count:
+            visible = [path for path in paths if getattr(instance.visibility, path)]
+            hidden = not visible or (without is not None and getattr(instance.visibility, without))
+            seen = sum(PATHS[path] for path in visible)
+            seen |= lights.DIFFUSE_FLAG if "volume" in paths and instance.visibility.diffuse else 0
+            if hidden or emissive.isdisjoint(instance.materials) or not mesh.triangle_count:
                 continue
             slots = mesh.triangle_materials(instance.materials)
             local = mesh.positions[mesh.corner_vertices[mesh.triangle_corners]]

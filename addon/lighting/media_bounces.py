@@ -45,6 +45,7 @@ CONSTANTS = (
     ("INT", "light_count"), ("IVEC2", "shown_pixel"), ("FLOAT", "offset_size"), ("FLOAT", "world_rows"),
     ("INT", "glass_blocks"),  # what it bends or mirrors arrives as beams
     ("INT", "stride"),
+    ("INT", "hidden_rows"),  # the first ones, that light surfaces and no media
 )  # fmt: skip
 PIXELS, CELLS, ON_SURFACES = "pixels", "cells of the view", "surfaces"  # where walks start
 START = {PIXELS: (), CELLS: (("FROM_FROXELS", "1"),), ON_SURFACES: (("FROM_SURFACES", "1"),)}
@@ -52,11 +53,12 @@ START = {PIXELS: (), CELLS: (("FROM_FROXELS", "1"),), ON_SURFACES: (("FROM_SURFA
 
 @dataclass(frozen=True)
 class Lit:
-    """What shines into media in a sample: lights' kinds as bits, how many rows, whether the world is asked by rays, and
-    what programs bind for them."""
+    """What shines into media in a sample: lights' kinds as bits, how many rows, how many of them (the first ones) light
+    surfaces alone, whether the world is asked by rays, and what programs bind for them."""
 
     kinds: int
     rows: int
+    hidden: int
     world: bool
     textures: dict[str, images.Image]
     blocks: dict[str, object]

@@ -114,7 +114,7 @@ def guide_program(kinds: int) -> Program:
         "media/guide.frag.glsl",
         textures=(*MEDIA_TEXTURES, ("RGBA32F", "surface_position")),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"), ("INT", "glass_blocks")),
+        constants=(("INT", "light_count"), ("INT", "glass_blocks"), ("INT", "hidden_rows")),
         defines=(("LIGHT_KINDS", str(kinds)),),
         outputs=(("VEC4", "out_guide"),),
     )
@@ -165,6 +165,7 @@ class Airlight(Technique):
     def __init__(self):
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
+        self._triangles_alone: EmissiveTriangles | None = None  # light surfaces and no media
         self._bounces = MediaBounces()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -186,7 +187,7 @@ class Airlight(Technique):
         textures, blocks, kinds = lit.textures, lit.blocks, lit.kinds
         frame.target("radiance.volume_emission").clear()
         rays = frame.settings.get(self, "rays") * stride * stride
-        places = places_of(rays, lit.rows + world)
+        places = places_of(rays, lit.rows - lit.hidden + world)
         program, names = airlight_program(kinds, world), ("radiance.volume_direct", "radiance.volume_emission")
         bindings = {
             "textures": textures | {"surface_position": frame.images["surface.position"]}, "blocks": blocks,
@@ -196,25 +197,31 @@ class Airlight(Technique):
             yield from self._draw_spread(frame, program, names, stride, **bindings)
         else:
             yield from self._draw(frame, program, names, **bindings)
-        frame.count(self, "light samples", lit.rows)
+        frame.count(self, "light samples", lit.rows - lit.hidden)
         bounces = min(frame.settings.bounces, max(frame.settings.get(self, "bounces"), 0))
         if frame.settings.bounces and (media.media.scatters or media.media.emits):
             yield from self._bounces.sample(frame, self, media.media, lit, asked, bounces)
 
     def _lit_by(self, frame: Frame, media: MediaService) -> Lit:
         """What shines into media in this sample."""
-        rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
-        found = {int(row[lights.LIGHT.at.kind]) % lights.KIND_STEPS for row in rows}
-        kinds = lights.kinds_of(emitters) | sum(1 << kind for kind in found if kind >= lights.DIRECTION)
+        hidden, emitters, rows, seen = [], [], [], []
+        if media.media.scatters:
+            if frame.settings.bounces:
+                hidden, emitters = self._rows_of(frame, self._surfaces_alone, self._triangles_alone)
+                hidden += self._rows_of_world(frame) if self._world_alone else []
+            rows, seen = self._rows_of(frame, self._emitters, self._triangles)
+            rows += self._rows_of_world(frame) if self._lit_by_world else []
+        found = {int(row[lights.LIGHT.at.kind]) % lights.KIND_STEPS for row in (*hidden, *rows)}
+        kinds = lights.kinds_of(emitters + seen) | sum(1 << kind for kind in found if kind >= lights.DIRECTION)
         textures = {**frame.hierarchy("volume").textures, **media.media.textures}
-        blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}
+        blocks = {"film_view": frame.view_block, "sources": self._sources.set(hidden + rows)}
         if self._lit_by_world:
             textures |= {
                 "environment_map": frame.environment.map,
                 "environment_density_map": frame.environment.density_map,
             }
             blocks["world_light"] = frame.environment.block
-        self._lit = Lit(kinds, len(rows), self._lit_by_world, textures, blocks)
+        self._lit = Lit(kinds, len(hidden) + len(rows), len(hidden), self._lit_by_world, textures, blocks)
         return self._lit
 
     @staticmethod
@@ -222,14 +229,14 @@ class Airlight(Technique):
         """CONSTANTS but for the pixel."""
         return {
             "light_count": lit.rows, "offset_size": frame.offset_size, "world_rows": float(world_directions(frame)),
-            "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)),
+            "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)), "hidden_rows": lit.hidden,
         }  # fmt: skip
 
     def _add_on_rays(self, frame: Frame, technique: Technique, rays: Rays, target: images.Target) -> None:
         """LightOfMedia.add, by the lights of the sample's own pass, which has run before."""
         lit, world = self._lit, self._lit_by_world
         program = at_hits_program(lit.kinds, world, rays.transmission)
-        places = places_of(frame.settings.get(self, "rays"), lit.rows + world)
+        places = places_of(frame.settings.get(self, "rays"), lit.rows - lit.hidden + world)
         passes.fullscreen(
             program, target, blend="ADDITIVE_PREMULT", where=rays.where, textures=lit.textures | rays.textures,
             blocks=lit.blocks,
@@ -261,7 +268,7 @@ class Airlight(Technique):
             passes.fullscreen(
                 asks, guide, textures={name: textures[name] for _, name in asks.textures},
                 blocks={name: blocks[name] for _, name in asks.blocks},
-                constants={"light_count": self._lit.rows, "glass_blocks": 0},
+                constants={"light_count": self._lit.rows, "glass_blocks": 0, "hidden_rows": self._lit.hidden},
             )  # fmt: skip
             read = {name: textures[name] for _, name in SPREAD.textures if name in textures}
             passes.fullscreen(
@@ -278,51 +285,62 @@ class Airlight(Technique):
     def begin(self, frame: Frame) -> None:
         """Find what shines into the media."""
         self._emitters = [one for one in frame.emitters if one.light.visibility.volume]
-        used = frame.snapshot.used_materials
-        self._triangles = None
-        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
-            triangles = EmissiveTriangles(frame, ("volume",))
-            self._triangles = triangles if triangles.power > 0 else None
-        self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.volume
+        # What lights surfaces and no media reaches those by a bounce.
+        self._surfaces_alone = [
+            one for one in frame.emitters if one.light.visibility.diffuse and not one.light.visibility.volume
+        ]
+        self._triangles = self._triangles_alone = None
+        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in frame.snapshot.used_materials):
+            seen = EmissiveTriangles(frame, ("volume",)), EmissiveTriangles(frame, ("diffuse",), without="volume")
+            self._triangles, self._triangles_alone = (one if one.power > 0 else None for one in seen)
         # Through fog without an end nothing comes from infinity.
         media = frame.service(MediaService)
         found = media.media.found if media is not None else []
         self._endless = is_endless(frame)
-        self._lit_by_world = self._world and not self._endless and any(one.scatters for one in found)
+        scatters = any(one.scatters for one in found)
+        visibility = frame.snapshot.world.visibility
+        shines = frame.environment.power > 0 and not self._endless and scatters
+        self._lit_by_world = shines and visibility.volume
+        self._world_alone = shines and visibility.diffuse and not visibility.volume
         if media is not None:
             frame.provide(MediaEmission("radiance.volume_emission"))
             frame.provide(LightOfMedia(self._add_on_rays))
 
-    def _rows(self, frame: Frame) -> tuple[list[np.ndarray], list[lights.Emitter]]:
-        """Points of this sample on lamps, shining meshes and the world, and the lamps among them."""
-        emitters = [one for one in self._emitters if one.kind != lights.SUN or not self._endless]
+    def _rows_of(
+        self, frame: Frame, emitters: list[lights.Emitter], triangles: EmissiveTriangles | None
+    ) -> tuple[list[np.ndarray], list[lights.Emitter]]:
+        """Points of this sample on lamps and shining meshes, and the lamps among them."""
+        emitters = [one for one in emitters if one.kind != lights.SUN or not self._endless]
         chosen, weight = lights.spread_choice(len(emitters), MOST_LAMPS, frame.uniform("airlight/choose"))
         rows = []
         for number in chosen:
             emitter = emitters[number]
             sample = emitter.sample(*frame.random_volume("airlight/light"))
             rows.append(emitter.row(sample, 0, int(emitter.light.cast_shadow), weight))
-        if self._triangles is not None:
+        if triangles is not None:
             # A bulb shines to all sides, which few points on it do not.
             count = FEW_EMISSIVE_POINTS if frame.settings.samples < FEW else EMISSIVE_POINTS
             for k in range(count):
                 drawn = frame.random_volume_at(frame.sample * count + k, "airlight/emissive")
                 samples = count * frame.settings.samples
-                rows.append(self._triangles.row(drawn, count, lights.SHADOW_FLAG, 1, samples))
-        if self._lit_by_world:
-            count = world_directions(frame)
-            for k in range(count):
-                drawn = frame.random_at(frame.sample * count + k, "airlight/world")
-                direction, radiance, density = frame.environment.draw(*drawn)
-                rows.append(
-                    lights.direction_row(direction, radiance / density, density, lights.SHADOW_FLAG, 0, 1, count)
-                )
+                rows.append(triangles.row(drawn, count, lights.SHADOW_FLAG, 1, samples))
         return rows, [emitters[number] for number in chosen]
+
+    @staticmethod
+    def _rows_of_world(frame: Frame) -> list[np.ndarray]:
+        """Directions of this sample in which the world is seen."""
+        rows, count = [], world_directions(frame)
+        flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG * frame.snapshot.world.visibility.diffuse
+        for k in range(count):
+            drawn = frame.random_at(frame.sample * count + k, "airlight/world")
+            direction, radiance, density = frame.environment.draw(*drawn)
+            rows.append(lights.direction_row(direction, radiance / density, density, flags, 0, 1, count))
+        return rows
 
     def release(self) -> None:
         self._sources.release()
         self._bounces.release()
-        self._triangles = None
+        self._triangles = self._triangles_alone = None
 
 
 def world_directions(frame: Frame) -> int:

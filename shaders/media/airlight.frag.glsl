@@ -83,7 +83,7 @@ void main()
   float begin = bins.from[0];
   float end = bins.to[bins.count - 1];
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < ROWS_ASKED; i++) {
+  for (int i = hidden_rows; i < ROWS_ASKED; i++) {
 #ifdef AT_HITS
     uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed * 64 + i + 8192 * (1 + ray_number))));
 #else

@@ -182,6 +182,9 @@ Asked ask_scattered(int number, uint inside, vec3 position, vec3 onwards, vec2 u
     return asked;
   }
 #endif
+  if (number < hidden_rows) {
+    return ask_nothing();
+  }
   Light light = light_read(number);
   float density;
   Asked asked = ask_light(light, position, u, density);

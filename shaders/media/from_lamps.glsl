@@ -6,7 +6,7 @@
 #include "media/asking.glsl"
 
 struct LampRays {
-  bool exist;
+  bool exist;  // to places in media; none of a row that lights surfaces alone
   vec3 apex;  // where all rays begin; behind a round lamp with a cone
   bool shadow;
   vec3 source;  // a point of the lamp, from where what it lights is looked for
@@ -33,12 +33,13 @@ LampRays lamp_rays(int number, vec2 u)
     return rays;
   }
   Light light = light_at(light_read(number), u);
-  rays.exist = !(LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION));
+  bool near = !(LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION));
+  rays.exist = near && number >= hidden_rows;
   bool round_lamp = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
   rays.apex = round_lamp ? light.centre : light.point;
   rays.source = round_lamp ? light.centre + light.point : light.point;
   rays.face = LIGHT_IS(light, LIGHT_SURFACE) ? light.axis : vec3(0.0);
-  rays.shadow = rays.exist && (light.flags & LIGHT_SHADOW) != 0;
+  rays.shadow = near && (light.flags & LIGHT_SHADOW) != 0;
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
     rays.axis = light.axis;
     rays.by_cosine = true;

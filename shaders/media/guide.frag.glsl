@@ -21,8 +21,8 @@ void main()
   float begin = bins.from[0];
   float end = bins.to[bins.count - 1];
   vec3 sum = vec3(0.0);
-  int around_places = clamp(48 / max(light_count, 1) / 2 * 2, 4, AROUND_PLACES);
-  for (int i = 0; i < light_count; i++) {
+  int around_places = clamp(48 / max(light_count - hidden_rows, 1) / 2 * 2, 4, AROUND_PLACES);
+  for (int i = hidden_rows; i < light_count; i++) {
     Light light = light_read(i);
     bool round_ = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
     bool far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);

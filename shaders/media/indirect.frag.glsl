@@ -34,6 +34,9 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
   Asked asked;
 #ifdef WORLD_LIT
   if (number >= light_count) {
+    if ((light_read(light_count - 1).flags & LIGHT_DIFFUSE) == 0) {
+      return ask_nothing();
+    }
     asked.direction = cosine_direction(normal, u);
     asked.reach = 1e29;
     asked.shadow = true;
@@ -45,6 +48,9 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
   }
 #endif
   Light light = light_read(number);
+  if ((light.flags & LIGHT_DIFFUSE) == 0) {
+    return ask_nothing();
+  }
   float density;
   asked = ask_light(light, position, u, density);
   float lobe = max(dot(normal, asked.direction), 0.0) / PI;

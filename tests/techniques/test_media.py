@@ -541,8 +541,10 @@ def test_denoising_keeps_the_light_of_a_shaft_and_takes_its_noise(stage):
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_a_camera_in_water_sees_what_the_water_leaves(stage, turn):
-    """What stands in it through one stretch, what stands behind its face through that and the interface. Both begin at the
-    camera's clip start, as in Cycles."""
+    """What stands in it through one stretch, what stands behind its face through that and the interface.
+
+    Both begin at the camera's clip start, as in Cycles.
+    """
     water = stage.material("ShaderNodeBsdfGlass", IOR=1.33, Roughness=0.0)
     fill(water.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.1, 0.6, 0.8, 1), Density=0.5)
     camera = stage.camera((0, 0, 0), (0, 0, 0), angle=0.02)  # looks down
@@ -552,7 +554,8 @@ def test_a_camera_in_water_sees_what_the_water_leaves(stage, turn):
     absorbed = 0.5 * np.array([0.9, 0.4, 0.2])
     seen = stage.render(4, size=(8, 8))["combined"][..., :3].mean(axis=(0, 1))
     interface = 1 - ((1.33 - 1) / (1.33 + 1)) ** 2
-    assert seen == pytest.approx(interface * np.exp(-(1 - start) * absorbed), rel=0.01)  # what is mirrored is chosen at random
+    left = np.exp(-(1 - start) * absorbed)
+    assert seen == pytest.approx(interface * left, rel=0.01)  # what is mirrored is chosen at random
     wall.location.z = 0.9  # in the water, 0.6 m below the camera
     seen = stage.render(1, size=(8, 8))["combined"][4, 4, :3]
     assert seen == pytest.approx(np.exp(-(0.6 - start) * absorbed), rel=1e-3)
@@ -568,3 +571,24 @@ def test_air_is_lit_by_the_meshes_that_volumes_may_see(stage):
     assert stage.render(1, (12, 12))["volume_direct"].mean() == pytest.approx(lit, rel=1e-3)
     lamp.visible_diffuse, lamp.visible_volume_scatter = True, False
     assert lit > 0.01 and not stage.render(1, (12, 12))["volume_direct"].any()
+
+
+@pytest.mark.slow
+def test_air_keeps_the_light_of_a_floor_whose_lamp_it_does_not_see(stage):
+    """In thin air what a floor reflects into it is all of its indirect light, whoever lights the floor."""
+    stage.camera((0, -6, 1.5), (np.pi / 2, 0, 0), angle=0.4)
+    fog(stage, Density=1e-3)
+    stage.floor(material=stage.diffuse(0.8))
+    lamp = stage.light("POINT", (0, 0, 2), energy=1000, shadow_soft_size=0.1)
+    stage.scene.candela.airlight_bounces = 1
+    found = {}
+    for name, hidden in (("seen", None), ("unseen by air", "volume_scatter"), ("unseen by floor", "diffuse")):
+        lamp.visible_volume_scatter, lamp.visible_diffuse = hidden != "volume_scatter", hidden != "diffuse"
+        found[name] = stage.render(4, size=(32, 32), bounces=1)
+    direct, indirect = (
+        {name: one[f"volume_{path}"][20:, :, 0].mean() for name, one in found.items()}
+        for path in ("direct", "indirect")
+    )
+    assert direct["unseen by air"] == 0 and direct["unseen by floor"] == pytest.approx(direct["seen"], rel=1e-3)
+    assert indirect["unseen by air"] == pytest.approx(indirect["seen"], rel=0.05)
+    assert indirect["unseen by floor"] < 0.02 * indirect["seen"]
