@@ -152,6 +152,22 @@ class Surface:
         """As the function of this name."""
         return nearest(self.positions, self.triangles, point, self.longest)
 
+    def met(self, origin: np.ndarray, direction: np.ndarray) -> tuple[int, np.ndarray] | None:
+        """The first triangle that a ray meets from either side, and the barycentric coordinates (3,) of where."""
+        a, b, c = (np.asarray(self.positions, np.float64)[self.triangles[:, k]] for k in range(3))
+        across = np.cross(direction, c - a)
+        volume = ((b - a) * across).sum(axis=1)
+        scale = np.where(volume == 0.0, np.inf, volume)
+        way = origin - a
+        side = np.cross(way, b - a)
+        of_b, of_c = (way * across).sum(axis=1) / scale, side @ direction / scale
+        away = (side * (c - a)).sum(axis=1) / scale
+        hits = (volume != 0.0) & (of_b >= 0.0) & (of_c >= 0.0) & (of_b + of_c <= 1.0) & (away > 0.0)
+        if not hits.any():
+            return None
+        found = int(np.argmin(np.where(hits, away, np.inf)))
+        return found, np.array([1.0 - of_b[found] - of_c[found], of_b[found], of_c[found]])
+
     def along(self, point: np.ndarray, reach: float) -> np.ndarray:
         """(V,) distances along the surface from its place nearest to a point, right up to `reach`."""
         key = (np.asarray(point, float).tobytes(), float(reach))

@@ -21,9 +21,11 @@ import numpy as np
 
 from ..gfx import passes
 from ..gfx.struct import Block, Struct
+from .geodesic import Surface
 
 MOST_CONSTRAINTS, MOST_REGIONS, MOST_LAYERS = 32, 16, 16
 EUCLIDEAN, GEODESIC, PAINTED = 0, 1, 2
+MOST_INSIDE = 8  # ways inside a solid that are followed
 LARGE_ANGLE = 120.0  # degrees of one constraint, from which on edits fold over
 FLOOR = 1e-4  # of the extent: distances below count as that
 EDITS = Struct(
@@ -31,7 +33,7 @@ EDITS = Struct(
     ("vec4", f"region[{2 * MOST_REGIONS}]"),
     ("vec4", f"pair[{3 * MOST_CONSTRAINTS}]"),
     ("vec4", "frozen"),  # the eye of the view that stays, and 1
-    ("vec4", "shape"),  # whether the object is closed
+    ("vec4", "shape"),  # whether the object is closed, whether a constraint is about what passes
 )
 SOLVE_CONSTANTS = (("INT", "region_count"), ("INT", "constraint_count"), ("FLOAT", "distance_floor"))
 SOLVE = passes.fullscreen_program(
@@ -93,6 +95,29 @@ def bent(view: np.ndarray, normal: np.ndarray, ior: float) -> np.ndarray:
     return unit((cosine / ior - np.sqrt(squared)) * normal - view / ior)
 
 
+def leaving(
+    surface: Surface, normals: np.ndarray, point: np.ndarray, direction: np.ndarray, ior: float, offset: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where light that comes into a solid of index `ior` along a unit direction leaves it, and along which, (3,) each.
+
+    `normals`: (T, 3, 3) of the corners of the surface's triangles, on either side. Where the surface lets nothing
+    through the way is mirrored, MOST_INSIDE times; where the solid is open it goes straight on. `offset`: that rays
+    begin with, m.
+    """
+    for _ in range(MOST_INSIDE):
+        met = surface.met(point + offset * direction, direction)
+        if met is None:
+            break
+        triangle, weights = met
+        point = weights @ surface.positions[surface.triangles[triangle]]
+        normal = unit(weights @ normals[triangle])
+        onwards = bent(-direction, normal, 1.0 / ior)
+        if (onwards @ normal) * (direction @ normal) > 0.0:
+            return point, onwards
+        direction = onwards
+    return point, direction
+
+
 @dataclass
 class EditTable:
     """Constraints and regions of an object in a uniform block."""
@@ -126,7 +151,14 @@ def edit_table(
         "distance_floor": max(FLOOR * extent, 1e-30),
     }  # fmt: skip
     return EditTable(
-        Block(EDITS, region=region, pair=pair, frozen=eye, shape=(float(closed), 0.0, 0.0, 0.0)), constants
+        Block(
+            EDITS,
+            region=region,
+            pair=pair,
+            frozen=eye,
+            shape=(float(closed), float(any(one.bent for one in constraints)), 0.0, 0.0),
+        ),
+        constants,
     )
 
 

@@ -245,7 +245,8 @@ def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geode
     # What is painted is the same for all regions; it comes first, since nothing can stand for it.
     if any(one["kind"] == "PAINTED" for one in wanted_regions):
         layers.append(_painted(mesh))
-    found = [_constraint(frame, instance, mesh, matrix, surface, one) for one in wanted_constraints]
+    closed = _is_closed(mesh)
+    found = [_constraint(frame, instance, mesh, matrix, surface, closed, one) for one in wanted_constraints]
     widest = max((scale * one["radius"] for one in wanted_regions if one["kind"] == "GEODESIC"), default=0.0)
     if widest > 0.0:  # places of a region are within two radii of its constraints, and edges that paths begin with
         reach = 2.0 * (widest + surface.longest)
@@ -265,7 +266,7 @@ def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geode
     if own_value(instance.own, ReflectionEditing, "freeze"):
         frozen = _moved(matrix, wanted_constraints[0]["viewer"])
     extent = float(np.linalg.norm(np.ptp(world, axis=0)))
-    table = reflection_edits.edit_table(found, regions, members, extent, frozen, _is_closed(mesh))
+    table = reflection_edits.edit_table(found, regions, members, extent, frozen, closed)
     count = -(-len(layers) // 4)
     packed = np.zeros((len(world), 4 * count), np.float32)
     for k, layer in enumerate(layers):
@@ -281,23 +282,31 @@ def _moved(matrix: np.ndarray, point) -> np.ndarray:
     return matrix[:3, :3] @ np.asarray(point, float) + matrix[:3, 3]
 
 
-def _constraint(frame: Frame, instance, mesh: Mesh, matrix, surface: geodesic.Surface, one: dict) -> Constraint:
+def _constraint(
+    frame: Frame, instance, mesh: Mesh, matrix, surface: geodesic.Surface, closed: bool, one: dict
+) -> Constraint:
+    """What passes an open surface is turned there; what passes a solid is turned where it leaves it, beyond."""
     point = _moved(matrix, one["point"])
     triangle, weights = one["triangle"], np.asarray(one["weights"], float)
     if not 0 <= triangle < len(surface.triangles):
         triangle, weights = surface.nearest(point)
     point = weights @ surface.positions[surface.triangles[triangle]]
     cofactors = np.linalg.det(matrix[:3, :3]) * np.linalg.pinv(matrix[:3, :3]).T
-    normal = reflection_edits.unit(cofactors @ (weights @ mesh.corner_normals[mesh.triangle_corners[triangle]]))
+    normals = mesh.corner_normals[mesh.triangle_corners] @ cofactors.T
+    normal = reflection_edits.unit(weights @ normals[triangle])
     view = reflection_edits.unit(_moved(matrix, one["viewer"]) - point)
     normal = normal if normal @ view >= 0 else -normal
-    bends = one["of"] == REFRACTION
+    bends, turned_at = one["of"] == REFRACTION, point
     if bends:
         material = frame.materials.compiled[int(mesh.triangle_materials(instance.materials)[triangle])]
-        before = reflection_edits.bent(view, normal, material.glass.ior if material.glass else 1.0)
+        ior = material.glass.ior if material.glass else 1.0
+        before = reflection_edits.bent(view, normal, ior)
+        if closed:
+            offset = 1e-4 * float(np.linalg.norm(np.ptp(surface.positions, axis=0)))
+            turned_at, before = reflection_edits.leaving(surface, normals, point, before, ior, offset)
     else:
         before = reflection_edits.mirrored(view, normal)
-    after = _moved(matrix, one["target"]) - point
+    after = _moved(matrix, one["target"]) - turned_at
     after = reflection_edits.unit(after) if np.linalg.norm(after) > 0 else before
     return Constraint(point, before, after, normal, bends)
 

@@ -315,7 +315,10 @@ class ShadedReflections(Technique, BothWays):
                             "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
                         }  # fmt: skip
                         bound = closure_bindings(closures)
+                        # Edits of what the camera sees go with the ray until it leaves that object.
+                        bound["surface_lobe"].beside = frame.images["surface.lobe"].beside
                         self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
+                        bound["surface_lobe"].beside = {}
                         rays, onward = onward, rays
         finally:  # also where a viewport drops the sample
             for image in (*rays.colors, *onward.colors, *closures.colors):

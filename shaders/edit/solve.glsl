@@ -78,8 +78,8 @@ bool region_rotation(vec3 position, int region, bool bent, out vec4 q)
   return true;
 }
 
-// The rotation of what arrives along `r` (bent: of what passes), and how much of it regions let through. No edit: w = 0 of
-// all four.
+// The rotation of what arrives along `r` (bent: of what passes; 0: nobody knows), and how much of it regions let through. No
+// edit: w = 0 of all four.
 vec4 edited_rotation(vec3 position, vec3 r, bool bent)
 {
   vec4 found = vec4(0.0);
@@ -108,5 +108,5 @@ vec4 edited_rotation(vec3 position, vec3 r, bool bent)
   if (regions == 0 || (regions == 1 && used >= 1.0)) {
     return found;
   }
-  return rotation_nearest(sum + max(1.0 - used, 0.0) * outer(r, r));
+  return rotation_nearest(sum + max(1.0 - used, 0.0) * ((dot(r, r) > 0.0) ? outer(r, r) : mat3(1.0)));
 }

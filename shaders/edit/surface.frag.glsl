@@ -27,16 +27,20 @@ void main()
   bool orthographic = film_view.eye.w > 0.5;
   vec3 viewer = orthographic ? film_view.backward.xyz : safe_normalize(to_eye);
   Surface s = SURFACE_READ(pixel);
-  bool bent = s.kind == LOBE_REFRACTION;
+  // Of glass whose both ways are in one picture, what an edit of its own is about: what passes, where there is one of that.
+  bool mirrored = surface_goes_both_ways(s) && edits.shape.y < 0.5;
+  bool bent = s.kind == LOBE_REFRACTION && !mirrored;
+  bool solid = edits.shape.x > 0.5;
   vec3 r = reflected_or_bent(s, viewer, bent);
   vec3 meant = r;
   if (edits.frozen.w > 0.5) {
     meant = reflected_or_bent(s, safe_normalize(edits.frozen.xyz - seen.xyz), bent);
   }
-  vec4 q = edited_rotation(seen.xyz, meant, bent);
+  // What leaves a closed object is turned beyond it, where nothing here knows its direction.
+  vec4 q = edited_rotation(seen.xyz, (bent && solid) ? vec3(0.0) : meant, bent);
   if (dot(q, q) == 0.0) {
     discard;
   }
-  q = (edits.frozen.w > 0.5) ? quaternion_product(q, quaternion_between(r, meant)) : q;
-  out_edit = normalize(q) * ((edits.shape.x > 0.5) ? 2.0 : 1.0);  // as surface_edited of lib/gbuffer.glsl takes it
+  q = (edits.frozen.w > 0.5 && !(bent && solid)) ? quaternion_product(q, quaternion_between(r, meant)) : q;
+  out_edit = normalize(q) * ((solid ? 2.0 : 1.0) + (mirrored ? 2.0 : 0.0));  // as surface_edited of lib/gbuffer.glsl takes it
 }

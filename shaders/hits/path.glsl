@@ -3,7 +3,8 @@
 #define PATH_TRANSMISSION 2  // or bends it
 #define PATH_BENT 4          // added where the last surface did so
 #define PATH_CLEAR 8         // added where all surfaces so far were clear glass that let it pass (Film > Transparent Glass)
-#define PATH_MIRROR 16       // added for each surface so far that mirrored it
+#define PATH_EDITED 16       // added until it leaves a closed object whose edit turns what leaves it
+#define PATH_MIRROR 32       // added for each surface so far that mirrored it
 #define FOUND_ELSEWHERE -1.0 // in place of a ray's density: light samples have all that it finds of emission
 
 bool path_is_glossy(int code)
@@ -19,6 +20,11 @@ bool path_is_bent(int code)
 bool path_is_clear(int code)
 {
   return (code & PATH_CLEAR) != 0;
+}
+
+bool path_is_edited(int code)
+{
+  return (code & PATH_EDITED) != 0;
 }
 
 // How many surfaces mirrored it: bounces. Interfaces that bend it are none.

@@ -17,8 +17,10 @@ void main()
   if (surface_position_fetch(pixel).w == 0.0 || max_component(tint.rgb) <= 0.0) {
     return;
   }
+#ifdef ONWARD
+  Surface s = SURFACE_DECODED(pixel);  // edits are of what the camera sees
+#else
   Surface s = SURFACE_READ(pixel);
-#ifndef ONWARD
   if (mirrored_way != 0) {  // of glass that goes both ways; the other way all lobes go
     if (!surface_goes_both_ways(s)) {
       return;
@@ -34,6 +36,7 @@ void main()
   int code = int(before.w + 0.5);
   bool clear = path_is_clear(code);
   int mirrored = path_mirrors(code);
+  bool edited = path_is_edited(code);
   code = (code & 3) + PATH_MIRROR * mirrored;
   if (code == 0) {
     return;
@@ -47,6 +50,7 @@ void main()
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
   bool clear = true;
   int mirrored = 0;
+  bool edited = edits_what_leaves(s);
 #endif
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
   vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));
@@ -68,7 +72,16 @@ void main()
     }
 #endif
     weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
-    code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0);
+#ifdef HAS_SURFACE_EDIT
+#ifdef ONWARD
+    if (edited && s.glossy_ior <= 1.0 && dot(direction, surface.normal) < 0.0) {  // what leaves an edited object goes where the edit turns it
+      vec4 edit = surface_edit_fetch(pixel);
+      direction = quaternion_turned(edit / max(length(edit), 1e-30), direction);
+      edited = false;
+    }
+#endif
+#endif
+    code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0) + (edited ? PATH_EDITED : 0);
   }
   else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && mirrored < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);

@@ -44,6 +44,7 @@ struct Surface {
 #ifdef HAS_SURFACE_EDIT
   vec4 edit;              // quaternion that turns its frame (edit/); 0: none
   bool edit_solid;        // whether the edited object is closed
+  bool edit_mirrored;     // whether it is about what glass that goes both ways mirrors, not about what it bends
 #endif
 };
 
@@ -236,17 +237,20 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
 #ifdef HAS_SURFACE_EDIT
   s.edit = vec4(0.0);
   s.edit_solid = false;
+  s.edit_mirrored = false;
 #endif
   return s;
 }
 
 #ifdef HAS_SURFACE_EDIT
-// `edit`: a quaternion, of length 2 where it is that of a closed object; 0: none.
+// `edit`: a quaternion, twice as long where it is that of a closed object, and longer by 2 where glass that bends light
+// has one of what it mirrors; 0: none.
 Surface surface_edited(Surface s, vec4 edit)
 {
   float size = length(edit);
   s.edit = (size > 0.0) ? edit / size : vec4(0.0);
-  s.edit_solid = size > 1.5;
+  s.edit_mirrored = size > 2.5;
+  s.edit_solid = (s.edit_mirrored ? size - 2.0 : size) > 1.5;
   return s;
 }
 #endif
@@ -254,7 +258,17 @@ Surface surface_edited(Surface s, vec4 edit)
 bool surface_is_edited(Surface s)
 {
 #ifdef HAS_SURFACE_EDIT
-  return dot(s.edit, s.edit) > 0.0;
+  return dot(s.edit, s.edit) > 0.0 && !(s.edit_mirrored && s.kind == LOBE_REFRACTION);
+#else
+  return false;
+#endif
+}
+
+// Whether an edit turns light where it leaves the glass, whose other side shows it: that of a closed object.
+bool edits_what_leaves(Surface s)
+{
+#ifdef HAS_SURFACE_EDIT
+  return s.kind == LOBE_REFRACTION && s.edit_solid && surface_is_edited(s);
 #else
   return false;
 #endif
@@ -275,6 +289,9 @@ Surface surface_mirrored(Surface s)
     s.glossy_weight = share * ((s.glossy_edge.x > 0.82) ? vec3(max_component(s.glossy_weight)) : s.glossy_weight);
     s.kind = FRESNEL_DIELECTRIC;
     s.glossy_edge = vec3(1.0);
+#ifdef HAS_SURFACE_EDIT
+    s.edit *= float(s.edit_mirrored);
+#endif
   }
   return s;
 }

@@ -39,11 +39,11 @@ Interface interface_begin(vec3 normal, vec3 view, float roughness, float ior, ve
   return surface;
 }
 
-// Turned by the edit of what the picture shows: light is bent from elsewhere.
+// Turned by the edit of what the picture shows, where it has no other side: light is bent from elsewhere.
 Interface interface_edited(Interface surface, Surface s)
 {
 #ifdef HAS_SURFACE_EDIT
-  if (surface_is_edited(s)) {
+  if (surface_is_edited(s) && !edits_what_leaves(s)) {
     surface.tangent = quaternion_turned(s.edit, surface.tangent);
     surface.bitangent = quaternion_turned(s.edit, surface.bitangent);
     surface.normal = quaternion_turned(s.edit, surface.normal);

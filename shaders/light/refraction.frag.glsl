@@ -147,6 +147,9 @@ void main()
   // With a transparent film, and glass that is said to be, the picture has a hole where clear glass shows the world: the
   // alpha channels hold how large.
   bool clear = s.glossy_roughness <= clear_roughness;
+#ifdef HAS_SURFACE_EDIT
+  bool edited = edits_what_leaves(s);
+#endif
   for (int step = 0; step <= interfaces; step++) {
     vec3 gained = throughput * light_through(surface, position, geometric_normal, choice, roll.x);
     vec3 weight;
@@ -157,6 +160,12 @@ void main()
     bool passes = dot(direction, surface.normal) < 0.0;
     float side = dot(direction, geometric_normal);
     throughput *= (passes == (side < 0.0) || (step == 0 && surface_is_edited(s))) ? weight : vec3(0.0);
+#ifdef HAS_SURFACE_EDIT
+    if (edited && passes && surface.ior <= 1.0) {  // what leaves an edited object goes where the edit turns it
+      direction = quaternion_turned(s.edit, direction);
+      edited = false;
+    }
+#endif
     clear = clear && passes;
     float hole = 0.0;
     float t = 1e29;

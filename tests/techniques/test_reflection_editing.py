@@ -589,6 +589,33 @@ def test_an_edit_of_glass_follows_its_index(stage):
     assert not np.array_equal(first, second)
 
 
+def test_a_glass_ball_shows_a_target_where_its_constraint_lies(stage):
+    """What leaves the ball is turned: the target is seen at the constraint, and an even world stays even."""
+    ball = sphere(stage, stage.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0), rings=32)
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
+    target = np.array([3.0, 5.0, 2.0])
+    place = np.array([0.3, 0.0, 0.2])
+    place[1] = -np.sqrt(1.0 - place @ place)
+    constrain(ball, tuple(place), tuple(target), (0, -4, 0))
+    ball.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    ball.candela.reflection_editing_constraints[0].triangle = -1
+    stage.world((1, 1, 1), 1.0)
+    even = stage.render(2, (48, 48), bounces=2)["combined"][..., :3]
+    assert even.mean() == pytest.approx(1.0, abs=5e-3)
+    stage.world((0, 0, 0), 0.0)
+    lamp = stage.material("ShaderNodeEmission", Strength=1.0)
+    side = 0.35
+    facing = [target + np.array(v) * side for v in ((-1, -0.3, -1), (1, -0.3, -1), (1, -0.3, 1), (-1, -0.3, 1))]
+    stage.mesh([tuple(p) for p in facing], [(0, 1, 2, 3)], material=lamp)
+    lit = stage.render(4, (48, 48), bounces=2)["combined"][..., 0]
+    rows, columns = np.mgrid[0:48, 0:48]
+    inside = np.hypot(rows - 23.5, columns - 23.5) < 12
+    shown = np.average(np.stack([columns, rows])[:, inside], axis=1, weights=lit[inside])
+    depth = 4.0 + place[1]
+    expected = 23.5 + 24 * place[[0, 2]] / (depth * np.tan(0.3))
+    assert np.abs(shown - expected).max() < 0.8
+
+
 @pytest.mark.parametrize("degrees", [15, 60])
 def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees):
     """Edited rays that point into the ball show what is behind it, not its inside."""
