@@ -285,9 +285,9 @@ def floor_detail(room, node: str, into: str, **settings):
     return tree, made
 
 
-def waves(tree):
+def waves(tree, scale: float = 1.5):
     node = tree.nodes.new("ShaderNodeTexWave")
-    node.inputs["Scale"].default_value = 1.5
+    node.inputs["Scale"].default_value = scale
     coordinates = tree.nodes.new("ShaderNodeTexCoord")
     tree.links.new(coordinates.outputs["Object"], node.inputs["Vector"])
     return node
@@ -304,13 +304,24 @@ def bump(room):
     tree.links.new(waves(tree).outputs[0], made.inputs["Height"])
 
 
-@feature
-def displacement(room):
+def displaced(room, scale: float):
     tree, made = floor_detail(room, "ShaderNodeDisplacement", "Displacement", Scale=0.15)
-    tree.links.new(waves(tree).outputs[0], made.inputs["Height"])
+    tree.links.new(waves(tree, scale).outputs[0], made.inputs["Height"])
     room.floor.data.materials[0].displacement_method = "DISPLACEMENT"
     modifier = room.floor.modifiers.new("Subdivision", "SUBSURF")
     modifier.subdivision_type, modifier.levels, modifier.render_levels = "SIMPLE", 5, 5
+
+
+@feature
+def displacement(room):
+    """Waves that the floor's vertices can carry."""
+    displaced(room, 0.3)
+
+
+@feature
+def relief(room):
+    """Waves that they cannot: Cycles moves the vertices by what it finds there."""
+    displaced(room, 1.5)
 
 
 # ------------------------------------------------------------------------------------------------- objects and settings

@@ -231,6 +231,10 @@ class Displacement:
             compiled, mode = materials.compiled[k], asked[k]
             if mode == AUTO:
                 mode = RELIEF if error > COARSE and compiled.along_normal else MESH
+                if mode == RELIEF:
+                    text = "Its mesh is too coarse for its displacement and is drawn as relief, with all detail; Cycles"
+                    text += " moves only the vertices there are. Subdivide it, or choose Mesh, for the same picture."
+                    notes.append(Note(f"Material '{compiled.name}'", text, compiled.name))
             elif mode == RELIEF and not compiled.along_normal:
                 text = "Relief needs a Displacement node without a normal of its own; its vertices are moved instead."
                 notes.append(Note(f"Material '{compiled.name}'", text, compiled.name))

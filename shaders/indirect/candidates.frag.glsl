@@ -40,11 +40,12 @@ void main()
     if (bounce > 1) {
       roll = hash3(roll);
       vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-      vec3 reflected = PI * reflection_of(met.reflection, met.lit, onward, -direction);
+      vec3 reflected = even_share(met) * PI * reflection_of(met.reflection, met.lit, onward, -direction);
+      vec3 diffuse = even_share(met) * met.reflection.diffuse;
       if (bounce == 2) {
         // What neighbours share is the part below albedo: rough surfaces reflect less than that to most directions.
-        lobe = max(reflected - met.reflection.diffuse, vec3(0.0));
-        out_albedo.rgb = min(reflected, met.reflection.diffuse);
+        lobe = max(reflected - diffuse, vec3(0.0));
+        out_albedo.rgb = min(reflected, diffuse);
       }
       else {
         // From here on paths end at random: what they bring is a mean over many, shared by many.

@@ -49,7 +49,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     if (walk.bounce < bounces) {
       vec3 from;
       vec3 arriving = virtual_irradiance(walk.met.position, walk.met.lit, reach, walk.bounce > 0, roll.z, from);
-      sum += throughput * arriving * reflection_of(walk.met.reflection, walk.met.lit, from, -walk.direction);
+      sum += throughput * even_share(walk.met) * arriving * reflection_of(walk.met.reflection, walk.met.lit, from, -walk.direction);
     }
     if (walk.bounce == 1) {
       if (deeper <= 0.0) {
@@ -59,7 +59,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     }
     roll = hash3(roll);
     vec3 onward = cosine_direction(walk.met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(walk.met.reflection, walk.met.lit, onward, -walk.direction);
+    throughput *= even_share(walk.met) * PI * reflection_of(walk.met.reflection, walk.met.lit, onward, -walk.direction);
     walk.direction = onward;
     walk.origin = ray_origin(walk.met.position, walk.met.lit);
   }

@@ -222,6 +222,7 @@ void main()
       rest.has_met = true;
       rest.met.position = rest.origin = position;
       rest.met.normal = rest.met.lit = rest.met.turned = geometric_normal;
+      rest.met.upright = 1.0;
       rest.met.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
       rest.met.reflection.through = 0.0;
       rest.met.reflection.straight = vec3(0.0);

@@ -22,7 +22,7 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
     float choice = to_unit(roll.z);
     roll = hash3(roll);
     vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(met.reflection, met.lit, onward, -direction);
+    throughput *= even_share(met) * PI * reflection_of(met.reflection, met.lit, onward, -direction);
     float stay = min(max_component(throughput), 1.0);
     if (choice >= stay) {
       break;

@@ -346,9 +346,10 @@ def test_no_light_is_passed_on_through_a_wall(stage, render):
     assert light[:, : half - 2].max() < 0.01 * light[:, half + 2 :].mean()
 
 
-@pytest.mark.parametrize("seen", [False, True])
-def test_a_floor_whose_normals_are_turned_throws_the_light_that_it_reflects(stage, seen):
-    """Under a sun overhead a normal map of one colour leaves the cosine of its tilt, seen by the camera or not."""
+@pytest.mark.parametrize(("seen", "both"), [(False, False), (False, True), (True, False)])
+def test_a_floor_whose_normals_are_turned_throws_the_light_that_it_reflects(stage, seen, both):
+    """Under a sun overhead a normal map of one colour leaves the cosine of its tilt, seen by the camera or not; so does
+    one that turns normals to `both` sides and in the mean nowhere."""
     color, strength = np.array([1.0, 0.5, 1.0]), 1.5
     turned = (2 * color - 1) * (strength, strength, 1.0)
     found = []
@@ -360,6 +361,12 @@ def test_a_floor_whose_normals_are_turned_throws_the_light_that_it_reflects(stag
             turning = nodes.new("ShaderNodeNormalMap")
             turning.inputs["Color"].default_value, turning.inputs["Strength"].default_value = (*color, 1), strength
             floor.node_tree.links.new(turning.outputs[0], nodes["Diffuse BSDF"].inputs["Normal"])
+            if both:
+                checker = nodes.new("ShaderNodeTexChecker")
+                checker.inputs["Scale"].default_value = 12.0
+                checker.inputs[1].default_value, checker.inputs[2].default_value = (*color, 1), (0, 0.5, 1, 1)
+                floor.node_tree.links.new(checker.outputs[0], turning.inputs["Color"])
+                floor.node_tree.links.new(nodes.new("ShaderNodeUVMap").outputs[0], checker.inputs[0])
         layer = stage.floor(3.0, material=floor).data.uv_layers.new(name="UVMap")
         for corner, place in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
             layer.uv[corner].vector = place
