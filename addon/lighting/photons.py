@@ -33,6 +33,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import gcd
 
 import numpy as np
 
@@ -59,6 +60,10 @@ EMISSION = Struct(
     # What a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in
     # all, 0 unknown, -1 one.
     ("vec4", "spread"),
+    # Of samples of unlike weight: what those that mirror at one of the first four inner faces lack or have more than
+    # others, as a factor of what passes in the rest.
+    ("vec4", "passing"),
+    ("float", "mirroring"),  # and of what they mirror
     ("vec4", "absorbed"),  # by insides, 1/m, in the mean
     ("int", "interfaces"),  # at most, after the first
     ("int", "bends"),  # 1: photons of the refracted lobe
@@ -95,6 +100,7 @@ WIDENING = 1.25  # of footprints beside the way to the neighbours: the least tha
 FALL_KNOWN, FALL_GROWING = -1.0 / 5.0, -1.0 / 5.0  # exponents of the footprints' fall with samples
 FEW = 16  # samples of a light, below which each has several of its points, and of the lobes of one material all
 VIEWS = 4  # of lights and casters in a sample, in the mean, where lights may take turns
+CHOICES = 0.569840291  # from one interface's number to the next, as in caustics/photon.frag.glsl
 WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
 MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
 LEAST_SIDE = 48
@@ -112,7 +118,8 @@ class LitView:
     index: int  # how many points of this light have had photons before
     count: int  # how many points of it the picture has, or has had up to now
     weight: float  # of the point's photons: they stand for the samples that have none
-    even: bool = True  # all points have known the same count: choices at interfaces may be shared out over them
+    strata: int = 0  # points of it that share out the choices at inner faces; 0: not known; -1: the likelier way alone
+    samples: int = 0  # of the picture, where each half of them shares out its number over half of these points
 
 
 @dataclass(frozen=True)
@@ -132,7 +139,30 @@ def _points(emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]],
         place = emitter.position(emitter.middle())
         far = [np.linalg.norm((low + high) / 2 - place) for low, high in boxes]
         width = emitter.reach / max(min(far, default=np.inf), 1e-30)
-    return int(np.clip(FEW // max(count, 1), 1, MOST_POINTS)) if width > WIDE else 1
+    most = int(np.clip(FEW // max(count, 1), 1, MOST_POINTS)) if width > WIDE else 1
+    return 1 << most.bit_length() - 1  # so that all of them are evenly spread
+
+
+def lattice(k: int, count: int) -> float:
+    """Number `k` of `count` at equal distances in 0..1, in an order that leaves no gap for long: steps of about the
+    golden section."""
+    step = next(one for one in range(round(0.618034 * count), 0, -1) if gcd(one, count) == 1) if count > 1 else 1
+    return k * step % count / count
+
+
+def balanced(light: LitView, moved: float) -> tuple[np.ndarray, float]:
+    """Factors of what passes at the first four inner faces and of what is mirrored, where one in `strata` mirrors:
+    weights of the two halves of the samples differ (sampling/turns.py), so that it matters in which that one is."""
+    passing, count = np.ones(4), light.strata
+    if not light.samples or count % 2:
+        return passing, 1.0
+    first, second = light.samples // 2 - 1, light.samples - light.samples // 2
+    weights = np.repeat([first, second], count // 2) * 2.0 / (first + second)  # 1 in the mean
+    numbers = np.array([lattice(k, count) for k in range(count)]) + moved
+    for face in range(4):
+        mirrors = int(np.argmin((numbers + face * CHOICES) % 1.0))
+        passing[face] = (count - 1) / (count - weights[mirrors])
+    return passing, 1.0 / weights[light.index % count]
 
 
 class Photons:
@@ -163,11 +193,18 @@ class Photons:
         had photons before, and how many have in all, where not all samples do and whoever asks weighs them."""
         reflected = (REFLECTED,) if frame.snapshot.film.caustics_reflective else ()
         alone = frame.settings.whole and frame.settings.samples == 1
+        whole = frame.settings.whole
         for emitter, index, count, weight in self._turns(frame, casters, turn):
             bends = casters.refracting and emitter.light.key in casters.bent
             lobes = ((REFRACTED,) if bends else ()) + reflected
             boxes = list(caustic_casters.boxes_of(frame, casters))
-            parts = _points(emitter, boxes, count)
+            sharing, of_turns = count, 0
+            if turn is not None and count > 1:
+                # Sample 0 has its photons before it is known how many others do: those are a set without it.
+                index, sharing, of_turns = max(index - 1, 0), count - (index > 0), frame.settings.samples
+            parts = _points(emitter, boxes, sharing)
+            strata = sharing * parts if whole else 0  # 1: see _drawn
+            strata = -1 if of_turns and sharing == count else strata
             texels = max(round(side / np.sqrt(parts)), min(side, LEAST_SIDE))
             for number in range(index * parts, (index + 1) * parts):
                 middle = alone and parts == 1
@@ -175,7 +212,8 @@ class Photons:
                 shift = frame.random_at(number, "caustics/grid")
                 for low, high in boxes:
                     for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):
-                        yield LitView(emitter, sample, view, lobes, number, count * parts, weight / parts, turn is None)
+                        shared = emitter, sample, view, lobes, number, count * parts, weight / parts
+                        yield LitView(*shared, strata, of_turns)
 
     def _rounds(self, frame: Frame, casters: caustic_casters.Casters) -> tuple[list[lights.Emitter], int]:
         """The lights that are answered for, and how many samples have photons of all of them. Where many lights see
@@ -255,14 +293,19 @@ class Photons:
         share = float(count) ** -0.5
         wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
         u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
-        strata = float(count) if frame.settings.whole and light.even and count > 1 else 0.0
+        passing, mirroring = np.ones(4), 1.0
+        if light.strata > 1:  # evenly, moved by the same for all: each part has one number at each interface
+            moved = frame.random_at(0, "caustics/interface")[1]
+            later = later[0], (lattice(light.index, light.strata) + moved) % 1.0
+            passing, mirroring = balanced(light, moved)
+        strata = float(light.strata)
         if count == 1:
             u, later, strata = (0.5, 0.5), (0.5, 0.5), -1.0
         parts = self._parts if count < FEW else 1  # of several lobes each by itself: one alone would tint all
         sources = self._sources.set([emitter.row(light.sample, 0, 0, light.weight / parts)])
         choice = frame.random_volume_at(light.index, "caustics/interface")[2]
-        if parts > 1 and frame.settings.whole and light.even:
-            choice = (light.index % count + 0.5) / count
+        if parts > 1 and light.strata > 0:
+            choice = (light.index % light.strata + 0.5) / light.strata
         drawn = (
             one
             for part in range(parts)
@@ -274,7 +317,7 @@ class Photons:
             values = {
                 "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),
                 "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), strata),
-                "absorbed": (*self._absorbed, 0.0),
+                "absorbed": (*self._absorbed, 0.0), "passing": tuple(passing), "mirroring": float(mirroring),
                 "interfaces": interfaces, "bends": int(lobe == REFRACTED),
             }  # fmt: skip
             if self._emission is None:

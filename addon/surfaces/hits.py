@@ -161,14 +161,15 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
     listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
     relief = (("RGBA32F", "shell_corners"),) if _has_relief(compiled) else ()
     shared = may_share(compiled)
-    room = len(compiled.images) + len(listed) + len(relief) < MOST_IMAGES + 1
+    free = MOST_IMAGES + 1 - len(compiled.images) - len(listed) - len(relief)
+    room, path = free > 0, free > 1 + 2 * shared
     return Program(
         name=f"hits {compiled.program_key[:8]}{' relief' * len(relief)}",
         fragment="hits/surface.frag.glsl",
         textures=(
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
             *relief, *(("FLOAT_2D", f"material_image{k}") for k in range(len(compiled.images))),
-            *((("UINT_2D", "materials_met"),) if room else ()),
+            *((("UINT_2D", "materials_met"),) if room else ()), *((("RGBA32F", "met_path"),) if path else ()),
             *((("R32F", "hit_material"), ("RGBA32F", "hit_materials")) if shared else ()),
         ),
         blocks=(
@@ -177,6 +178,7 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
         ),
         constants=(
             ("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth"), ("INT", "material_number"),
+            *((("INT", "path_known"),) if path else ()),
         ),
         snippets=(("generated/material", f"{compiled.glsl}\n{_fill(len(compiled.attributes))}"),),
         **{
@@ -184,7 +186,7 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             "defines": (
                 *MASKED["defines"], *AVERAGING_DEFINES, *((("ASKS_IF_MET", str(MET_ROWS)),) if room else ()),
                 *((("SHARED_VALUES", "1"), ("MATERIAL_BASE", "MET_MATERIAL_BASE")) if shared else ()),
-                *((("OWN_SURFACE", ""),) if relief else ()),
+                *((("OWN_SURFACE", ""),) if relief else ()), *((("PATH_COLOR", ""),) if path else ()),
             ),
         },
     )  # fmt: skip
@@ -334,20 +336,21 @@ class Hits:
 
     def shading(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
-        closures: images.Target, number: int = 0, masked: bool = False,
+        closures: images.Target, number: int = 0, masked: bool = False, path: images.Image | None = None,
     ) -> Iterator[None]:  # fmt: skip
         """Evaluate these materials at the records into `closures` (take_closures), which is cleared before; `masked`:
-        of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0. In
-        parts: after each program that draws for the first time, which takes the driver long."""
+        of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0;
+        `path`: what the rays' paths let pass (rgb), by which lobes are chosen. In parts: after each program that draws
+        for the first time, which takes the driver long."""
         images.Target(closures.colors[:1] if masked else closures.colors).clear()
         leaders = {frame.materials.leaders[k] for k in materials}
         # One program after the other: between materials that share one, only what differs is bound.
         order = sorted(leaders, key=lambda k: (_program_key(frame.materials.compiled[k]), k))
         fresh = [k for k in order if _program_key(frame.materials.compiled[k]) not in self._compiled]
         for material in fresh:
-            self._draw(frame, ray_direction, records, [material], closures, number)
+            self._draw(frame, ray_direction, path, records, [material], closures, number)
             yield
-        self._draw(frame, ray_direction, records, [k for k in order if k not in fresh], closures, number)
+        self._draw(frame, ray_direction, path, records, [k for k in order if k not in fresh], closures, number)
         if self._flagged:
             with images.borrowed(1, 1, "R32F") as count:
                 number_of_all = {"material_count": len(frame.materials.compiled)}
@@ -357,8 +360,8 @@ class Hits:
         frame.count(technique, "passes", len(leaders) + 1)
 
     def _draw(
-        self, frame: Frame, ray_direction: images.Image, records: Records, order: list[int], closures: images.Target,
-        number: int,
+        self, frame: Frame, ray_direction: images.Image, path: images.Image | None, records: Records, order: list[int],
+        closures: images.Target, number: int,
     ) -> None:  # fmt: skip
         """Evaluate materials, by their leaders, in this order."""
         if not order:
@@ -371,6 +374,8 @@ class Hits:
         with passes.drawing(closures, depth_test="EQUAL", depth_write=False):
             for material in order:
                 program, own = self._own_bindings(frame, material, number)
+                if ("INT", "path_known") in program.constants:
+                    own["constants"]["path_known"] = int(path is not None)
                 if program.textures and ("UINT_2D", "materials_met") in program.textures:
                     own["textures"]["materials_met"] = records.met
                 wanted = passes.get_for(program, own["textures"])
@@ -381,6 +386,8 @@ class Hits:
                     textures, blocks = own["textures"] | shared, own["blocks"] | view
                     if ("R32F", "hit_material") in program.textures:
                         textures |= lists
+                    if ("RGBA32F", "met_path") in program.textures:
+                        textures["met_path"] = path or ray_direction
                     shader.bind(textures=textures, blocks=blocks, constants=own["constants"])
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))

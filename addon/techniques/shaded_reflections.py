@@ -292,8 +292,9 @@ class ShadedReflections(Technique, BothWays):
                         met = hits.trace(frame, self, rays.colors[:2], records, number=number)
                         yield
                         yield from hits.shading(
-                            frame, self, rays.colors[1], records, met, closures, number, masked=True
-                        )
+                            frame, self, rays.colors[1], records, met, closures, number, masked=True,
+                            path=rays.colors[2],
+                        )  # fmt: skip
                         yield
                         self._into = drawing.images(number)
                         self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)

@@ -189,8 +189,13 @@ void main()
       }
       Interface surface = interface_begin(smooth_normal, -onward, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
                                           scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
-      onward = interface_sample_strata(surface, drawn, numbers.y, photon_light.spread.w, weight);
+      float strata = photon_light.spread.w;
+      onward = interface_sample_strata(surface, drawn, (strata < 0.0) ? 0.5 : numbers.y, strata, weight);
       passes = dot(onward, smooth_normal) < 0.0;
+      float chance = interface_mirror_chance(surface, interface_reflectance(surface, -dot(came, smooth_normal)));
+      if (chance > 0.0 && chance * strata < 1.0 && strata > 0.0) {  // one of the samples mirrors here, of another weight than others
+        weight *= passes ? photon_light.passing[min(step, 3)] : photon_light.mirroring;
+      }
       weight /= passes ? ior * ior : 1.0;
       lobe_spread = max(lobe_spread, interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, passes, ior));
     }

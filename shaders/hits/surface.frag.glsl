@@ -1,5 +1,8 @@
 // Evaluates one material where rays have met it, into closures laid out as those of the surface pass.
 //
+// Of several lobes one is kept, by what the path that came here can bring of each (`met_path`, with PATH_COLOR): light that
+// is green by now leaves a prism by the glass for green.
+//
 // What is transparent has been passed at random on the way, as opaque as its triangle is there (trace/hierarchy.glsl): what
 // is met stands for all rays that were not.
 #include "lib/math.glsl"
@@ -37,6 +40,13 @@ void main()
   uvec3 salt = roll_of(pixel, 0, film_view.seed, 81 + ray_number);
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
   Closures c = closures_begin(point.normal, shuffled(film_view.sample_index, salt.xy), even_share);
+#ifdef PATH_COLOR
+  if (path_known != 0) {
+    vec3 path = met_path_fetch(pixel).rgb;
+    float most = max_component(path);
+    c.path = (most > 0.0 && is_finite(most)) ? path / most : vec3(1.0);
+  }
+#endif
   evaluate_material(point, c);
   closures_end(c);
   float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);

@@ -105,6 +105,9 @@ struct Closures {
   float glossy_chance;    // that the lobe that is kept was to be
   float even_share;       // of that chance, which all lobes have alike
   float random;           // uniform 0..1, reused by rescaling
+#ifdef PATH_COLOR
+  vec3 path;              // what the path that came here lets pass, up to a factor: what it lacks no lobe can bring
+#endif
 #ifdef SUBSURFACE
   vec3 scatter;           // of the diffuse albedo, the part whose light entered elsewhere
   vec3 scatter_length;    // SCATTER_* length of its profile, m, times the albedo
@@ -155,6 +158,9 @@ Closures closures_begin(vec3 normal, float random_number, float even_share)
   c.glossy_chance = 1.0;
   c.even_share = even_share;
   c.random = random_number;
+#ifdef PATH_COLOR
+  c.path = vec3(1.0);
+#endif
 #ifdef SUBSURFACE
   c.scatter = vec3(0.0);
   c.scatter_length = vec3(0.0);
@@ -170,12 +176,22 @@ Closures closures_begin(vec3 normal, float random_number, float even_share)
   return c;
 }
 
+// Of a lobe's colour what the path has a use for: chances are in proportion to that.
+vec3 useful_color(Closures c, vec3 color)
+{
+#ifdef PATH_COLOR
+  return c.path * color;
+#else
+  return color;
+#endif
+}
+
 // Closures with one normal and roughness add up. Of others one is kept with all of their weight, so that the mean is exact.
 void closure_diffuse(inout Closures c, vec3 weight, vec3 color, float roughness, vec3 normal)
 {
   vec3 albedo = weight * color;
   // Weights near the end of float32 add up to infinity, of which there is no share.
-  float added = min(dot(albedo, vec3(1.0)), 1e30);
+  float added = min(dot(useful_color(c, albedo), vec3(1.0)), 1e30);
   if (!(added > 0.0)) {
     return;
   }
@@ -206,7 +222,8 @@ void closure_diffuse(inout Closures c, vec3 weight, vec3 color, float roughness,
 // `importance` estimates the lobe's albedo and only steers noise.
 bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
 {
-  float w = max(max(weight.x, weight.y), weight.z) * max(importance, 1e-4);
+  vec3 useful = useful_color(c, weight);
+  float w = max(max(useful.x, useful.y), useful.z) * max(importance, 1e-4);
   if (!(w > 0.0)) {
     return false;
   }

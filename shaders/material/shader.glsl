@@ -66,6 +66,16 @@ float largest(vec3 v)
   return max(max(v.x, v.y), v.z);
 }
 
+// How bright a lobe of this albedo is to the path that came here.
+float useful_luminance(Closures closures, vec3 albedo)
+{
+#ifdef PATH_COLOR
+  return color_luminance(closures.path * albedo) / max(color_luminance(closures.path), 1e-6);
+#else
+  return color_luminance(albedo);
+#endif
+}
+
 // Adds a glossy lobe and returns its albedo, weight included: what the layers below do not get.
 vec3 add_glossy(inout Closures closures, SurfacePoint point, vec3 weight, int distribution, int fresnel, vec3 tint,
                 vec3 edge, float ior, float roughness, float anisotropy, vec3 tangent, vec3 normal)
@@ -79,8 +89,8 @@ vec3 add_glossy(inout Closures closures, SurfacePoint point, vec3 weight, int di
     albedo /= max(multiscatter_darkening(fresnel, tint, edge, ior, wide, mu), vec3(1e-4));
     lobe_weight /= multiscatter_scale(fresnel, tint, edge, ior, wide, mu);
   }
-  if (closure_glossy(closures, lobe_weight, color_luminance(albedo), fresnel, tint, edge, ior, roughness, anisotropy,
-                     tangent, normal)) {
+  if (closure_glossy(closures, lobe_weight, useful_luminance(closures, albedo), fresnel, tint, edge, ior, roughness,
+                     anisotropy, tangent, normal)) {
     closures.distribution = distribution;
   }
   return weight * albedo;

@@ -1,5 +1,6 @@
 """Shading of hits: mirrors and glass show surfaces with their own materials, bounce by bounce, by closed forms."""
 
+import bpy
 import numpy as np
 import pytest
 
@@ -163,3 +164,29 @@ def test_a_faint_coat_costs_less_than_a_tenth_of_a_mirror(stage):
         stage.render(128, (16, 12), bounces=1)
         passes.append(stage.ledger.row("shaded_reflections").counters["passes"])
     assert passes[1] < 0.1 * passes[0]
+
+
+def prism(stage, glasses):
+    """Glass nodes, added: a color for each index."""
+    made = stage.material("ShaderNodeAddShader")
+    tree = made.node_tree
+    joined = next(node for node in tree.nodes if node.type == "ADD_SHADER")
+    for socket, (ior, color) in zip(joined.inputs, glasses.items()):
+        node = tree.nodes.new("ShaderNodeBsdfGlass")
+        node.inputs["IOR"].default_value, node.inputs["Color"].default_value = ior, (*color, 1)
+        node.inputs["Roughness"].default_value = 0.0
+        tree.links.new(node.outputs[0], socket)
+    return made
+
+
+def test_light_that_is_red_leaves_a_prism_by_the_glass_for_red(stage):
+    """A ball of red and cyan glass in an even world: as bright as the world, and no path of a color that the next
+    glass does not have stands for those that it does."""
+    glasses = {1.2: (1.0, 0.0, 0.0), 1.4: (0.0, 1.0, 1.0)}
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=12)
+    bpy.context.object.data.materials.append(prism(stage, glasses))
+    stage.world((1.0, 1.0, 1.0))
+    stage.camera_above(0.8)
+    seen = stage.render(16, (16, 16), bounces=8)["combined"][..., :3]
+    assert seen.mean() == pytest.approx(1.0, abs=0.05)
+    assert seen.max() < 1.5
