@@ -11,7 +11,8 @@ void store_closures(Closures c, SurfacePoint point, float covered, float holdout
   if (dot(c.glossy_tangent, c.glossy_tangent) > 0.0) {
     half_turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / PI + 1.0);
   }
-  bool displaced = dot(c.base_normal, point.mesh_normal) < 0.9999;
+  // Of what is bumped the normal that it has without: displaced, or smooth on few triangles. Else the triangle's will do.
+  bool displaced = dot(c.base_normal, point.mesh_normal) < 0.9999 || dot(c.base_normal, point.geometric_normal) < 0.99;
   out_position = vec4(point.position, bump_encode(holdout, c.base_normal, c.diffuse_normal, displaced));
   float rough = floor(clamp(c.diffuse_roughness, 0.0, 1.0) * 255.0 + 0.5) / 255.0;  // as it will be read
   out_normal = vec4(diffuse_normal_encode(c.diffuse_normal, c.diffuse_weight * covered, rough),

@@ -94,3 +94,24 @@ def test_a_normal_map_on_a_displaced_surface_is_dimmed_by_what_lies_between_the_
     ours = lit()
     assert ours == pytest.approx(lit(engine="CYCLES"), rel=0.03)
     assert ours == pytest.approx(ALBEDO * np.cos(tilt - sun) * shadowing, rel=0.03)
+
+
+@pytest.mark.parametrize("sun", [-0.2, 0.7])
+def test_a_bump_on_a_smooth_mesh_of_few_faces_is_dimmed_by_what_turns_it_from_the_smooth_normal(stage, sun):
+    """Normals of the floor's vertices lean by .5 towards -x; they are kept to within four degrees."""
+    tilt, lean = 0.3, -0.5
+    material = stage.diffuse(ALBEDO)
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    turned = nodes.new("ShaderNodeNormalMap")
+    turned.space = "WORLD"
+    turned.inputs["Color"].default_value = (0.5 + 0.5 * np.sin(tilt), 0.5, 0.5 + 0.5 * np.cos(tilt), 1.0)
+    links.new(turned.outputs[0], next(node for node in nodes if node.type == "BSDF_DIFFUSE").inputs["Normal"])
+    floor = stage.rectangle((-4, -4), (4, 4), material=material)
+    floor.data.polygons.foreach_set("use_smooth", [True])
+    floor.data.normals_split_custom_set([(np.sin(lean), 0.0, np.cos(lean))] * 4)
+    stage.camera_above(2.0)
+    stage.light("SUN", turn=(0.0, sun, 0.0), energy=np.pi, angle=0.0)
+    found = float(light_paths(stage.render(4, (8, 8)))["diffuse_direct"].mean())
+    roughness_squared = min(0.125 * np.tan(tilt - lean) ** 2, 1.0)
+    shadowing = 2.0 / (1.0 + np.sqrt(1.0 + roughness_squared * np.tan(sun - lean) ** 2))
+    assert found == pytest.approx(ALBEDO * np.cos(tilt - sun) * shadowing, rel=0.03)
