@@ -199,9 +199,13 @@ class CandelaEngine(bpy.types.RenderEngine):
         self.active_view_set(eye)
         scene, film = depsgraph.scene_eval, snapshot.film
         camera = self.camera_override or scene.camera
-        placed = np.array(self.camera_model_matrix(camera), np.float64).reshape(4, 4)
+        spherical = bool(self.use_spherical_stereo(camera))
+        matrix = self.camera_model_matrix(camera, use_spherical_stereo=spherical)
+        placed = np.array(matrix, np.float64).reshape(4, 4)
         shift = self.camera_shift_x(camera)
-        view = camera_of_scene(scene, depsgraph, film.width, film.height, camera, placed, shift)
+        view = camera_of_scene(
+            scene, depsgraph, film.width, film.height, camera, placed, shift, eye if spherical else ""
+        )
         return replace(snapshot, camera=view)
 
     def _render(self, depsgraph, snapshot: Snapshot, eye: str) -> None:

@@ -75,8 +75,8 @@ save("no_camera.blend")
 eye = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
 scene.collection.objects.link(eye)
 scene.camera = eye
-eye.data.type = "PANO"
-save("panoramic.blend")
+eye.data.type = "CUSTOM"
+save("custom_lens.blend")
 eye.data.type = "PERSP"
 bpy.ops.mesh.primitive_cube_add(location=(0, 0, -5))
 material = bpy.data.materials.new("Marble")
@@ -145,7 +145,7 @@ def test_options_that_do_not_fit_the_file_are_refused(options, words, tmp_path):
         ("truncated", ["could not be opened"]),
         ("newer", ["could not be opened", "newer version"]),
         ("no_camera", ["no camera"]),
-        ("panoramic", ["'Eye'", "Perspective"]),
+        ("custom_lens", ["'Eye'", "Perspective"]),
     ],
 )
 @pytest.mark.slow
@@ -155,8 +155,8 @@ def test_file_that_cannot_be_rendered_is_refused(name, words, blends, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_plan_refuses_a_panoramic_camera(blends, tmp_path):
-    assert_refused(candela("plan", blends / "panoramic.blend", folder=tmp_path), 1, "'Eye'", "Perspective")
+def test_plan_refuses_a_lens_that_is_a_program(blends, tmp_path):
+    assert_refused(candela("plan", blends / "custom_lens.blend", folder=tmp_path), 1, "'Eye'", "Perspective")
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ class Room:
     optional: tuple[str, ...] = ()  # packages that Blender lacks: only inside a function
 
 
-DATA = ("materials", "snapshot.scene")
+DATA = ("materials", "snapshot.scene", "snapshot.panorama")
 BELOW_FRAME = ("gfx", "sampling", "kernels", "scene", "sources", *DATA)
 ON_A_FRAME = ("surfaces", "film", "lighting")  # pieces that techniques share, each on those before it
 BELOW_TECHNIQUES = (*BELOW_FRAME, "eye", "frame", "grass", *ON_A_FRAME)
@@ -36,6 +36,7 @@ ROOMS = {
     "materials.reader": Room(modules=BLENDER),
     "snapshot": Room(rooms=("materials",), modules=BLENDER, optional=("openvdb",)),
     "snapshot.scene": Room(rooms=("materials",), modules=("numpy",)),
+    "snapshot.panorama": Room(modules=("numpy",)),
     "sampling": Room(rooms=DATA, modules=("numpy",)),
     "kernels": Room(rooms=("gfx",), modules=("numpy",)),
     "eye": Room(modules=("numpy",)),

@@ -21,6 +21,7 @@ from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, point, third, uniform
+from ..scene import panorama
 from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
@@ -69,6 +70,9 @@ class Frame:
     measured_emission: EmissionMaps
     lamp_maps: LampMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
+    tiles: list[panorama.Tile] = field(
+        default_factory=list
+    )  # by which a panoramic camera is drawn; of another there are none
     sample: int = 0  # the sample that is running
     at: str = ""  # label of the technique that is at work, or was last
     film_points: int = 1  # that a sample shows; the surface technique says it before it looks
@@ -174,6 +178,9 @@ class Frame:
         )
         self.view_block.update(**values)
         self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
+        if self.snapshot.camera.panorama is not None:
+            self.tiles = self.tiles or panorama.tiles_of(self.view)
+            panorama.look(self.tiles, self.view, number, settings.seed, self.geometry.size, lens, self._footprints())
 
     def _footprints(self) -> tuple[float, float]:
         """Sides in pixels of the squares over which lookups of textures average (materials/averages.py). All samples

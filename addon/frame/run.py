@@ -21,6 +21,7 @@ from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compiling
 from ..scene.media import has_media, volumes_key
 from ..scene.opacity_maps import OpacityMaps
+from ..scene.panorama import ANSWERS
 from ..scene.surface_means import SurfaceMeans
 from ..scene.view import VIEW, View
 from ..scene.world_tree import WorldTree
@@ -129,6 +130,7 @@ class Renderer:
         values = view.values(0, settings.seed, (0.0, 0.0), self.geometry.size)
         if self._view_block is None:
             self._view_block = Block(VIEW, **values)
+        self._view_block.answers = ANSWERS if snapshot.camera.panorama else ()
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
@@ -391,6 +393,7 @@ class Renderer:
             lights_key(snapshot), self._lamp_maps.changes, casters, self._environment[0], self.materials.fingerprint(),
             volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
+            camera.panorama,
             settings.seed, settings.bounces, settings.draft, settings.shows, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw),
             settings.whole and (settings.time_limit, settings.noise_threshold),

@@ -128,14 +128,15 @@ def compute(program: Program, size: tuple[int, int], **bindings) -> None:
 
 
 def _for_images(program: Program, bindings: dict) -> Shader:
-    """The shader of a program, with what the images that it reads define and bring along, if it has room for that."""
+    """The shader of a program, with what the images that it reads define and bring along, if it has room for that, and
+    with what its blocks answer."""
     read, blocks = bindings.get("textures") or {}, bindings.get("blocks") or {}
     for image in read.values():
         if image.beside or image.defines:
             break
     else:
         for block in blocks.values():
-            if block.beside:
+            if block.beside or block.answers:
                 break
         else:
             return get(program)
@@ -149,16 +150,21 @@ def _for_images(program: Program, bindings: dict) -> Shader:
     if beside:
         bindings["textures"] = {**read, **beside}
     defines = tuple(one for image in read.values() for one in image.defines)
-    return get(_with_images(program, defines, tuple((image.format, name) for name, image in beside.items())))
+    answers = tuple(one for block in blocks.values() for one in block.answers)
+    return get(_with_images(program, defines, tuple((image.format, name) for name, image in beside.items()), answers))
 
 
 @lru_cache(maxsize=1024)
-def _with_images(program: Program, defines: tuple[tuple[str, str], ...], beside: tuple[tuple[str, str], ...]):
-    if not defines and not beside:
+def _with_images(
+    program: Program, defines: tuple[tuple[str, str], ...], beside: tuple[tuple[str, str], ...],
+    answers: tuple[tuple[str, str], ...],
+) -> Program:  # fmt: skip
+    if not (defines or beside or answers):
         return program
     there = tuple((f"HAS_{name.upper()}", "1") for _, name in beside)
     textures = (*program.textures, *beside)
-    return replace(program, defines=(*program.defines, *defines, *there), textures=textures)
+    snippets = (*program.snippets, *(one for one in answers if one not in program.snippets))
+    return replace(program, defines=(*program.defines, *defines, *there), textures=textures, snippets=snippets)
 
 
 class _state:

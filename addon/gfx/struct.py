@@ -72,11 +72,12 @@ class Struct:
 
 class Block:
     """A uniform buffer of one record of a struct. Images `beside` it, by name, are bound with it, as those beside
-    an image are (images.Image)."""
+    an image are (images.Image). `answers`: snippets by which full-screen and compute programs that read it differ."""
 
     def __init__(self, struct: Struct, **values):
         self.struct = struct
         self.beside: dict[str, object] = {}
+        self.answers: tuple[tuple[str, str], ...] = ()
         self._data = struct.pack(**values)
         self._content = self._data.tobytes()
         self.buffer = gpu.types.GPUUniformBuf(self._bytes())

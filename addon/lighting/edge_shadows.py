@@ -23,6 +23,7 @@ from ..gfx.library import Program
 from ..sampling import sequence
 from ..scene import edges
 from ..scene.edges import CasterEdges, EdgeCache
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..surfaces.draw import SURFACES
@@ -121,6 +122,8 @@ class EdgeShadows(PointMaps):
             return "lights without shadow", None
         if not emitter.extended:
             return "lights without extent", None
+        if bends_lines(frame.snapshot):
+            return "lights of a panoramic picture: rays or maps", None
         if tinted_casters(frame, glass_alone(frame)):  # what edges find is a share of the light, without colour
             return "lights that coloured panes tint: rays or maps", None
         nearest = edge_tiles.nearest_receiver(frame, emitter)

@@ -35,7 +35,7 @@ from ..kernels.morton import morton_codes
 from ..scene.culling import CORNERS
 from ..scene.geometry import DIFFUSE_FLAG
 from ..scene.materials import SURFACE_IMAGES
-from ..scene.view import VIEW
+from ..scene.view import STRAIGHT, VIEW
 from ..sources import lights
 from ..surfaces.draw import OPAQUE, STOCHASTIC, draw_view
 
@@ -223,7 +223,7 @@ def _view(orthographic: bool, eye, u, v, backward, window, side: int, far: float
         "eye": (*eye, float(orthographic)), "right": (*u, 0.0), "up": (*v, 0.0), "backward": (*backward, near),
         "frame": window, "film": (side, side, 0.0, 1e30), "sample_index": 0, "seed": 0,
         "bits_x": 0, "bits_y": 0, "bits_z": 0, "bits_w": 0, "visibility": DIFFUSE_FLAG,
-        "footprint_exact": 0.0, "footprint_first": 0.0,
+        "footprint_exact": 0.0, "footprint_first": 0.0, **STRAIGHT,
     }  # fmt: skip
     return LightView(values, rows, low, high)
 

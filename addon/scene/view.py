@@ -9,11 +9,13 @@ import numpy as np
 
 from ..gfx.struct import Struct
 from ..sampling.sequence import pixel_bits
+from ..snapshot.panorama import PROJECTIONS
 from ..snapshot.scene import Camera, Film
 from .geometry import CAMERA_FLAG
 
 # `q` is the depth measure of every projection in Candela: it is an affine function of window coordinates on any
 # plane (1/distance for perspective, distance along the axis for orthographic), and grows towards the viewer.
+PANORAMA_FIELDS = "panorama", "panorama_more", "panorama_eye", "panorama_stereo", "panorama_film"
 VIEW = Struct(
     "View",
     ("vec4", "row_x"),  # clip = dot(row, vec4(position, 1))
@@ -36,7 +38,10 @@ VIEW = Struct(
     # Pixels over which lookups of textures average (materials/averages.py); 0: what stands at the point.
     ("float", "footprint_exact"),
     ("float", "footprint_first"),
+    # Of a panoramic camera: see shaders/view/panorama.glsl.
+    *(("vec4", name) for name in PANORAMA_FIELDS),
 )
+STRAIGHT = dict.fromkeys(PANORAMA_FIELDS, (0.0, 0.0, 0.0, 0.0))  # those of any other view
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,8 @@ class View:
         so that the plane in focus stays where it is.
         """
         orthographic = self.camera.kind == "ORTHOGRAPHIC"
+        panorama = self._panorama(lens)
+        lens = (0.0, 0.0) if self.camera.panorama else lens
         shear, frame, (right_axis, up, backward, eye), (x, y, depth) = self._looking(tuple(lens))
         left, right, bottom, top = frame
         width, height = self.size
@@ -109,7 +116,28 @@ class View:
             "film": (width, height, start, end),
             "sample_index": sample, "seed": seed,
             "visibility": CAMERA_FLAG, "footprint_exact": footprints[0], "footprint_first": footprints[1],
-            **dict(zip(("bits_x", "bits_y", "bits_z", "bits_w"), pixel_bits(sample))),
+            **dict(zip(("bits_x", "bits_y", "bits_z", "bits_w"), pixel_bits(sample))), **panorama,
+        }  # fmt: skip
+
+    def _panorama(self, lens: tuple[float, float]) -> dict:
+        """Fields of VIEW that only a panoramic camera has."""
+        panorama, camera = self.camera.panorama, self.camera
+        if panorama is None:
+            return STRAIGHT
+        values = (*panorama.values, *(0.0,) * 9)
+        focus = camera.aperture.focus if camera.aperture and any(lens) else 0.0
+        stereo = panorama.stereo
+        if panorama.projection == "FISHEYE_LENS_POLYNOMIAL":
+            values = (values[0], values[4], values[2], values[3], *values[5:])
+        width, height = self.film.width, self.film.height
+        return {
+            "panorama": values[:4], "panorama_more": values[4:8],
+            "panorama_eye": (*lens, focus, float(PROJECTIONS[panorama.projection])),
+            "panorama_stereo": (0.0,) * 4 if stereo is None else (
+                stereo.offset, stereo.convergence if np.isfinite(stereo.convergence) else 0.0,
+                stereo.merge_from, stereo.merge_to,
+            ),
+            "panorama_film": (self.film.border[0] / width, self.film.border[1] / height, 1 / width, 1 / height),
         }  # fmt: skip
 
     def _looking(self, lens: tuple[float, float]) -> tuple:

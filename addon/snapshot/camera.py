@@ -9,16 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from .errors import UnsupportedScene
+from .panorama import Panorama, panorama_of
 from .scene import Aperture, Camera
 
 
 def camera_of_scene(
-    scene, depsgraph, width: int, height: int, camera=None, placed: np.ndarray | None = None, shift: float | None = None
-) -> Camera:
+    scene, depsgraph, width: int, height: int, camera=None, placed: np.ndarray | None = None,
+    shift: float | None = None, eye: str = "",
+) -> Camera:  # fmt: skip
     """The view of `camera`, or of the scene's active camera, on a picture of `width` x `height` pixels.
 
-    `placed`, `shift`: matrix and horizontal shift other than its own, of an eye of a stereoscopic pair.
-    Raises UnsupportedScene when there is no camera, or when it is neither perspective nor orthographic.
+    `placed`, `shift`: matrix and horizontal shift other than its own, of an eye of a stereoscopic pair; `eye`: "left"
+    or "right" of a spherical one, whose place depends on where it looks.
+    Raises UnsupportedScene when there is no camera, or when it is of a kind that is not drawn.
     """
     camera = camera or scene.camera
     if camera is None:
@@ -27,10 +30,10 @@ def camera_of_scene(
         raise UnsupportedScene(f"Object '{camera.name}' is the scene's camera but no camera object: choose another.")
     camera = camera.evaluated_get(depsgraph)
     data = camera.data
-    if data.type not in ("PERSP", "ORTHO"):
+    if data.type not in ("PERSP", "ORTHO", "PANO"):
         raise UnsupportedScene(
-            f"Camera '{camera.name}': lens type {data.type.title()} is not supported; choose Perspective or"
-            " Orthographic in the camera's Lens panel."
+            f"Camera '{camera.name}': lens type {data.type.title()} is not supported, since it is a program in OSL,"
+            " which only Cycles runs; choose Perspective, Orthographic or Panoramic in the camera's Lens panel."
         )
     if placed is None:
         placed = np.array(camera.matrix_world, np.float64)
@@ -38,6 +41,8 @@ def camera_of_scene(
         text = "has a position that is not a finite number; check its drivers and constraints."
         raise UnsupportedScene(f"Camera '{camera.name}' {text}")
     aspect = (scene.render.pixel_aspect_x, scene.render.pixel_aspect_y)
+    if data.type == "PANO":
+        return _panoramic(camera, placed, width * aspect[0], height * aspect[1], eye)
     return Camera(
         matrix=_rigid(placed),
         kind="PERSPECTIVE" if data.type == "PERSP" else "ORTHOGRAPHIC",
@@ -103,10 +108,36 @@ def _frame(
     return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
 
 
+def _panoramic(camera, placed: np.ndarray, width: float, height: float, eye: str) -> Camera:
+    """The view of an evaluated panoramic camera; `width` and `height` of the picture in square pixels."""
+    data = camera.data
+    try:
+        panorama = panorama_of(data, width, height, eye)
+    except ValueError as refused:
+        raise UnsupportedScene(f"Camera '{camera.name}': {refused}") from refused
+    half_x, half_y = (0.5 * side * mean_angle(panorama, width, height) for side in (width, height))
+    return Camera(
+        _rigid(placed), "PANORAMIC", (-half_x, half_x, -half_y, half_y), data.clip_start, data.clip_end, camera.name,
+        _aperture(camera), panorama,
+    )  # fmt: skip
+
+
+def mean_angle(panorama: Panorama, width: float, height: float) -> float:
+    """The side of a square of the solid angle that a pixel shows, radians: the median over the picture."""
+    columns, rows = min(int(width), 128), min(int(height), 128)
+    seen = panorama.directions(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1)[:, None])
+    across, along = seen[:-1, 1:] - seen[:-1, :-1], seen[1:, :-1] - seen[:-1, :-1]
+    there = (np.abs(seen).sum(axis=-1) > 0.0)[:-1, :-1] & (np.linalg.norm(across, axis=-1) < 1.0)
+    areas = np.linalg.norm(np.cross(across, along), axis=-1)[there]
+    areas = areas[areas > 0.0]
+    typical = float(np.sqrt(np.median(areas))) if len(areas) else 1.0
+    return typical * np.sqrt(columns * rows / (width * height))
+
+
 def _aperture(camera) -> Aperture | None:
     """The lens of an evaluated camera object; None where depth of field is off or would change nothing."""
     dof = camera.data.dof
-    if not dof.use_dof or camera.data.type not in ("PERSP", "ORTHO"):
+    if not dof.use_dof or camera.data.type not in ("PERSP", "ORTHO", "PANO"):
         return None
     focus = dof.focus_distance
     if dof.focus_object is not None:
@@ -114,7 +145,7 @@ def _aperture(camera) -> Aperture | None:
         towards = np.array(_focus_point(dof), np.float64) - placed[:3, 3]
         focus = abs(float(towards @ _rigid(placed)[:3, 2]))
     # An orthographic camera has no focal length; as in Cycles its aperture is that of one of a metre.
-    length = 0.001 * camera.data.lens if camera.data.type == "PERSP" else 1.0
+    length = 0.001 * camera.data.lens if camera.data.type != "ORTHO" else 1.0
     radius = length / (2.0 * max(dof.aperture_fstop, 1e-5))
     # What is in focus at the eye itself is in focus nowhere; as in Cycles the picture stays sharp then.
     if not (np.isfinite(focus) and np.isfinite(radius) and focus > 1e-6 and radius > 0.0):

@@ -112,6 +112,10 @@ def take(
     volumes += read_smoke(domains, domain_places, shading, override, cache, notes)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
+    film = _film(scene, depsgraph.view_layer_eval, width, height, border)
+    if view.panorama is not None and any(aov.kind == "VECTOR" for aov in film.aovs):
+        film = replace(film, aovs=tuple(aov for aov in film.aovs if aov.kind not in ("VECTOR", "HIT")))
+        notes.append(Note("Vector pass", "it stays empty: how surfaces move in a panoramic picture is not drawn."))
     notes += [*shading.notes, *images.notes]
     cache.finish(meshes, images.images, shading.graphs)
     stats.update(images_read=images.read, images_reused=images.reused)
@@ -123,7 +127,7 @@ def take(
         lights=lights,
         world=world,
         camera=view,
-        film=_film(scene, depsgraph.view_layer_eval, width, height, border),
+        film=film,
         notes=tuple(dict.fromkeys(notes)),
         scene_name=scene.name,
         moment=Moment(scene.frame_current_final, scene.render.fps / scene.render.fps_base),

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..materials.graph import Graph
 from ..materials.volume import Medium
+from .panorama import Panorama
 
 
 def one_line(text: str) -> str:
@@ -240,9 +241,10 @@ class Aperture:
 
 @dataclass(frozen=True)
 class Camera:
-    """A view. `kind` PERSPECTIVE or ORTHOGRAPHIC; the frustum is given on the plane one unit before the camera.
+    """A view. `kind` PERSPECTIVE, ORTHOGRAPHIC or PANORAMIC; the frustum is given on the plane one unit before it.
 
-    `frame` = (left, right, bottom, top): for PERSPECTIVE tangents of the view angles, for ORTHOGRAPHIC metres;
+    `frame` = (left, right, bottom, top): for PERSPECTIVE tangents of the view angles, for ORTHOGRAPHIC metres, for
+    PANORAMIC (whose `panorama` says what it sees) as wide as pixels of the mean angle, in radians, together;
     lens shift, sensor fit and pixel aspect are contained. It spans the full picture, not the render border.
     """
 
@@ -253,6 +255,7 @@ class Camera:
     clip_end: float
     name: str = ""
     aperture: Aperture | None = None  # None: all is in focus
+    panorama: Panorama | None = None
 
 
 @dataclass(frozen=True)

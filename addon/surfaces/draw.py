@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
+from contextlib import ExitStack
 from functools import cache
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..scene.culling import calls, entered
 from ..scene.joint_draws import Joint, JointDraws
 from ..scene.materials import FIRST_VALUE, SURFACE_IMAGES, AovLayout
 from ..scene.view import VIEW
+from .tiles import clear_outside, draw_seen
 
 STOCHASTIC, OPAQUE, LEFT_OUT, FROM_OPACITY = 0, 1, 2, 3
 TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
@@ -61,11 +63,22 @@ def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mod
     """Draw what the camera sees into six surface images with a depth buffer. `mode` says what becomes of transparent
     layers: STOCHASTIC, OPAQUE, LEFT_OUT, or FROM_OPACITY plus thousandths of opacity. `glass`: 1 it is drawn as a
     surface, and is no such layer; 2 so, as one lobe (goes_both_ways)."""
+
+    def draw(target: images.Target, view: Block, rows: np.ndarray) -> None:
+        _draw_surfaces(frame, technique, target, mode, glass, view, rows)
+
+    draw_seen(frame, target, draw)
+    clear_outside(frame, target.colors[-1])
+
+
+def _draw_surfaces(
+    frame: Frame, technique: Technique, target: images.Target, mode: int, glass: int, view: Block, rows: np.ndarray
+) -> None:
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What reaches the eye where nothing is hit:
     images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
     with passes.drawing(target):
-        _submit(frame, technique, frame.materials.surface_program, None, drawing_constants(mode, glass))
+        _submit(frame, technique, frame.materials.surface_program, None, drawing_constants(mode, glass), view, rows)
     frame.count(technique, "passes")
 
 
@@ -98,10 +111,14 @@ def draw_numbers(frame: Frame, technique: Technique, target: images.Target) -> N
 def _draw_indices(
     frame: Frame, technique: Technique, target: images.Target, indices: list[int], mode: int = STOCHASTIC
 ) -> None:
-    target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     constants = drawing_constants(mode, refracts(frame))
-    with passes.drawing(target):
-        _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
+
+    def draw(target: images.Target, view: Block, rows: np.ndarray) -> None:
+        target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+        with passes.drawing(target):
+            _submit(frame, technique, frame.materials.surface_program, None, constants, view, rows, indices=indices)
+
+    draw_seen(frame, target, draw)
 
 
 class StandIns:
@@ -129,18 +146,48 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
 
 
 def _draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
+    def draw(target: images.Target, view: Block, rows: np.ndarray) -> None:
+        _draw_layers(frame, technique, target, view, rows)
+
+    draw_seen(frame, target, draw)
+    clear_outside(frame, target.colors[-1])
+
+
+def _draw_layers(frame: Frame, technique: Technique, target: images.Target, view: Block, rows: np.ndarray) -> None:
+    """Surfaces, and the colours of the layers before them."""
     glass = refracts(frame)
-    draw_surfaces(frame, technique, target, STOCHASTIC, 2 if goes_both_ways(frame) else int(glass))
+    _draw_surfaces(frame, technique, target, STOCHASTIC, 2 if goes_both_ways(frame) else int(glass), view, rows)
     tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted or material.added}
     if not tinted:
         return
     # Multiply what was hit by the colour of the layers before it that let this sample pass.
     drawn = dict(zip(SURFACES, target.colors))
     colors = images.Target(tuple(drawn[name] for name in TINTED))
-    position = {"surface_position": drawn["surface.position"]}
+    position, constants = {"surface_position": drawn["surface.position"]}, {"glass_bends": int(glass)}
     with passes.drawing(colors, blend="MULTIPLY", depth_test="NONE", depth_write=False):
-        _submit(frame, technique, frame.materials.tint_program, tinted, {"glass_bends": int(glass)}, position)
+        _submit(frame, technique, frame.materials.tint_program, tinted, constants, view, rows, position)
     frame.count(technique, "passes")
+
+
+def _draw_behind(frame: Frame, technique: Technique, target: images.Target, position: images.Image, draw, blend="NONE"):
+    """As draw_seen, for what is drawn before surfaces that are known: `draw` is also given where they lie. Tiles of a
+    panoramic camera draw them anew."""
+
+    def known(target: images.Target, view: Block, rows: np.ndarray) -> None:
+        draw(target, view, rows, position)
+
+    def anew(target: images.Target, view: Block, rows: np.ndarray) -> None:
+        with ExitStack() as stack:
+            kinds = ("RGBA32F",) * len(SURFACE_IMAGES), ("DEPTH_COMPONENT32F",)
+            seen, depth = (
+                tuple(stack.enter_context(images.borrowed(*target.size, kind)).colors[0] for kind in some)
+                for some in kinds
+            )
+            _draw_layers(frame, technique, images.Target(seen, depth[0]), view, rows)
+            target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+            draw(target, view, rows, seen[0])
+
+    draw_seen(frame, target, anew if frame.tiles else known, blend)
 
 
 def add_glow(frame: Frame, technique: Technique, position: images.Image, emission: images.Image) -> None:
@@ -149,11 +196,15 @@ def add_glow(frame: Frame, technique: Technique, position: images.Image, emissio
     glowing = {k for k, material in enumerate(frame.materials.compiled) if material.glows}
     if not glowing:
         return
-    state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
-    with passes.drawing(images.Target((emission,)), **state):
-        constants, textures = {"glass_bends": int(refracts(frame))}, {"surface_position": position}
-        _submit(frame, technique, frame.materials.glow_program, glowing, constants, textures)
-    frame.count(technique, "passes")
+    constants = {"glass_bends": int(refracts(frame))}
+
+    def draw(target: images.Target, view: Block, rows: np.ndarray, position: images.Image) -> None:
+        with passes.drawing(target, blend="ADDITIVE_PREMULT", depth_test="NONE", depth_write=False):
+            textures = {"surface_position": position}
+            _submit(frame, technique, frame.materials.glow_program, glowing, constants, view, rows, textures)
+        frame.count(technique, "passes")
+
+    _draw_behind(frame, technique, images.Target((emission,)), position, draw, "ADDITIVE_PREMULT")
 
 
 @cache
@@ -191,7 +242,7 @@ def draw_aovs(
         return frame.materials.aov_program(material, layout)
 
     threshold = frame.snapshot.film.alpha_threshold
-    textures = {"surface_position": position}
+    textures = {}
     if any(kind == "VECTOR" for held in layout for _, kind in held):
         textures["motion_table"] = motion
         blocks = {"film_view": frame.view_block}
@@ -199,13 +250,18 @@ def draw_aovs(
             motion_behind(layout), images.Target(target.colors), textures={"motion_table": motion}, blocks=blocks
         )
     thin = {k for k, material in enumerate(frame.materials.compiled) if material.transparent and threshold > 0.0}
-    for layers, wanted in ((0, None), (1, thin)):
-        if wanted is None or wanted:
-            blend = "ADDITIVE_PREMULT" if layers else "NONE"
-            with passes.drawing(target, blend=blend, depth_write=not layers):
-                constants = {"layers": layers, "alpha_threshold": threshold}
-                _submit(frame, technique, program_of, wanted, constants, textures)
-            frame.count(technique, "passes")
+
+    def draw(target: images.Target, view: Block, rows: np.ndarray, position: images.Image) -> None:
+        for layers, wanted in ((0, None), (1, thin)):
+            if wanted is None or wanted:
+                blend = "ADDITIVE_PREMULT" if layers else "NONE"
+                with passes.drawing(target, blend=blend, depth_write=not layers):
+                    constants = {"layers": layers, "alpha_threshold": threshold}
+                    read = {**textures, "surface_position": position}
+                    _submit(frame, technique, program_of, wanted, constants, view, rows, read)
+                frame.count(technique, "passes")
+
+    _draw_behind(frame, technique, target, position, draw)
 
 
 def draw_scatter(
@@ -214,11 +270,15 @@ def draw_scatter(
     """Draw how far light spreads below the surfaces of `materials`, where this sample's surface images show them, into
     SCATTER_IMAGES. `objects`: by instance, see scene/scatter_points.py."""
     target.clear((0.0, 0.0, 0.0, 0.0))
-    textures = {"surface_position": frame.images["surface.position"], "scatter_objects": objects}
-    with passes.drawing(target, depth_test="NONE", depth_write=False):
-        constants = {"glass_bends": int(refracts(frame))}
-        _submit(frame, technique, frame.materials.scatter_program, materials, constants, textures)
-    frame.count(technique, "passes")
+    constants = {"glass_bends": int(refracts(frame))}
+
+    def draw(target: images.Target, view: Block, rows: np.ndarray, position: images.Image) -> None:
+        textures = {"surface_position": position, "scatter_objects": objects}
+        with passes.drawing(target, depth_test="NONE", depth_write=False):
+            _submit(frame, technique, frame.materials.scatter_program, materials, constants, view, rows, textures)
+        frame.count(technique, "passes")
+
+    _draw_behind(frame, technique, target, frame.images["surface.position"], draw)
 
 
 def draw_view(
@@ -228,19 +288,17 @@ def draw_view(
     """Draw `materials`, each with the program that `program_of` says, as any view sees them: its fields in a block of
     VIEW, and its `rows` x, y, w, q. The target, with a depth buffer, is not cleared."""
     with passes.drawing(target, depth_test=depth_test):
-        _submit(frame, technique, program_of, materials, constants, view=view, rows=rows)
+        _submit(frame, technique, program_of, materials, constants, view, rows)
     frame.count(technique, "passes")
 
 
 def _submit(
-    frame: Frame, technique: Technique, program_of, materials: Collection[int] | None, constants: dict, textures=None,
-    indices: list[int] | None = None, view: Block | None = None, rows: np.ndarray | None = None,
+    frame: Frame, technique: Technique, program_of, materials: Collection[int] | None, constants: dict, view: Block,
+    rows: np.ndarray, textures=None, indices: list[int] | None = None,
 ) -> None:  # fmt: skip
-    """Draw what a view (None: the camera) may see of `materials` (None: of all), each with its own program. `indices`:
-    by material, what is shown instead of where surfaces lie."""
-    rows = frame.view_rows if rows is None else rows
-    geometry, view = frame.geometry, view or frame.view_block
-    left = None
+    """Draw what a view may see of `materials` (None: of all), each with its own program. `indices`: by material, what
+    is shown instead of where surfaces lie."""
+    geometry, left = frame.geometry, None
     of_surfaces = program_of == frame.materials.surface_program
     stand_ins = frame.shared(StandIns).of if of_surfaces else {}
     if of_surfaces and indices is None and not stand_ins:

@@ -22,7 +22,7 @@ from ..gfx.struct import Block
 from ..scene.culling import calls
 from ..scene.materials import SURFACE_IMAGES
 from ..scene.overview import DIRECTIONS, overview, some
-from ..scene.view import VIEW
+from ..scene.view import STRAIGHT, VIEW
 from .draw import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
 
 SIDE = 16  # pixels of one view
@@ -145,7 +145,7 @@ def _values(view: dict) -> dict:
     return {
         **view, "film": (SIDE, SIDE, 0.0, 4 * view["frame"][1]), "sample_index": 0, "seed": 0,
         **dict.fromkeys(("bits_x", "bits_y", "bits_z", "bits_w"), 0), "visibility": EVERY_FLAG,
-        "footprint_exact": 0.0, "footprint_first": 0.0,
+        "footprint_exact": 0.0, "footprint_first": 0.0, **STRAIGHT,
     }  # fmt: skip
 
 

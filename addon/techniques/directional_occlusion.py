@@ -46,6 +46,7 @@ from ..lighting.loop import DIRECT_WRITES
 from ..lighting.media import dimmed
 from ..scene import acceleration
 from ..scene.view import VIEW
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..sources.environment import WORLD, Environment
 from ..surfaces.draw import SURFACES
@@ -93,7 +94,7 @@ class DirectionalOcclusion(Technique):
         self._blurred: tuple[Environment, images.Image] | None = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        reason = no_environment_light(snapshot)
+        reason = no_environment_light(snapshot) or bends_lines(snapshot)
         return reason or (None if snapshot.world.visibility.diffuse else "the world is hidden from diffuse surfaces")
 
     def sample(self, frame: Frame) -> Iterator[None]:

@@ -34,6 +34,7 @@ from ..gfx.library import Program
 from ..scene.culling import closed
 from ..scene.materials import CAMERA_DEFINES, SURFACE_IMAGES
 from ..scene.view import VIEW
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from ..surfaces import geodesic, reflection_edits
 from ..surfaces.draw import SURFACE_TEXTURES, SurfaceStages
@@ -144,7 +145,7 @@ class ReflectionEditing(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not any(_edits(instance)[0] for instance in snapshot.instances if instance.own):
             return "no object has an edit of its reflections"
-        return None
+        return bends_lines(snapshot)
 
     def begin(self, frame: Frame) -> None:
         rows = {id(instance): row for row, instance in enumerate(frame.geometry.placed[0])}

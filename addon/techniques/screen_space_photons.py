@@ -41,6 +41,7 @@ from ..lighting.caustic_maps import SEEN, CausticMaps
 from ..lighting.photons import FOOTPRINTS, PHOTONS, LitView, Photons
 from ..scene import acceleration
 from ..scene.view import VIEW
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACES, surface_bindings
 
@@ -87,7 +88,7 @@ class ScreenSpacePhotons(Technique):
         if settings.bounces < 1:
             return "light is not reflected on its way (0 bounces)"
         found = caustic_casters.casters_of(snapshot)
-        return found if isinstance(found, str) else acceleration.too_many(snapshot)
+        return found if isinstance(found, str) else bends_lines(snapshot) or acceleration.too_many(snapshot)
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         """Wherever it can trace: its error is below that of look-ups in every scene of docs/caustics.md."""

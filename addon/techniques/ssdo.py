@@ -44,6 +44,7 @@ from ..lighting.leaving_light import lit_at_hits
 from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights
 from ..scene import acceleration
 from ..scene.view import VIEW
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 from .instant_radiosity import INDIRECT_WRITES, no_indirect_light
@@ -137,7 +138,7 @@ class ScreenSpaceBounce(Technique):
         self._paths = VirtualLights()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        return no_indirect_light(snapshot, settings)
+        return no_indirect_light(snapshot, settings) or bends_lines(snapshot)
 
     def begin(self, frame: Frame) -> None:
         if self._traces(frame):

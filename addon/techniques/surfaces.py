@@ -160,7 +160,7 @@ def _receivers_key(frame: Frame, modes: tuple[int, ...]) -> tuple:
     camera, settings = frame.snapshot.camera, frame.settings
     return (
         frame.size, modes, camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-        camera.aperture, frame.snapshot.film, settings.seed, settings.draft, refracts(frame),
+        camera.aperture, camera.panorama, frame.snapshot.film, settings.seed, settings.draft, refracts(frame),
         frame.geometry.changes, frame.geometry.origin.tobytes(), frame.materials.fingerprint(),
         tuple(sorted(settings.values.items())), tuple(technique.name for technique in frame.plan.techniques),
         frame.snapshot.own_values,

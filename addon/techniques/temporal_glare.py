@@ -41,6 +41,7 @@ from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import CAMERA, Param, Technique, Write
 from ..gfx import passes
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Camera, Snapshot
 from .eye import BILLBOARDS, GLARE, MODE, OFF, PointSpread
 
@@ -97,7 +98,7 @@ class TemporalGlare(Technique):
             return "glare is off for this camera"
         if not settings.get(self, "strength"):
             return "its strength is 0"
-        return None
+        return bends_lines(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple:
         return scatter.MEASURE, scatter.BLOCKS  # what else there is may never be needed

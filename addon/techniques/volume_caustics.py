@@ -45,6 +45,7 @@ from ..materials.graph import Graph
 from ..scene import acceleration
 from ..scene.media import ATTENUATION_TEXTURES, MEDIA_TEXTURES, has_media
 from ..scene.view import VIEW
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from .airlight import may_send, volume_graphs
@@ -113,7 +114,7 @@ class VolumeCaustics(Technique):
             return "no lamp shines into the volumes"
         if settings.bounces == 0:
             return "the scene's bounces are set to 0"
-        return acceleration.too_many(snapshot)
+        return bends_lines(snapshot) or acceleration.too_many(snapshot)
 
     def begin(self, frame: Frame) -> None:
         """Find what bends light and the sphere around it, and the lamps that may reach it."""

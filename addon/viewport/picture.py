@@ -419,4 +419,5 @@ class Viewport:
 
 
 def _view_key(camera: Camera) -> tuple:
-    return camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture
+    seen = camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end
+    return *seen, camera.aperture, camera.panorama

@@ -1,6 +1,7 @@
 // The caustics of lights on what rays have met: what diffuse closures there reflect of the irradiance that kept maps hold
 // for their place. Of the four texels around it those count whose surface lies on the hit's plane. The maps are cells of
 // one image.
+#include "lib/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "hits/path.glsl"
 
@@ -33,7 +34,7 @@ vec3 place_of(vec2 texel, vec2 size, float depth)
 {
   vec2 window = mix(map_view.frame.xz, map_view.frame.yw, (texel + 0.5) / size);
   vec3 across = window.x * map_view.right.xyz + window.y * map_view.up.xyz;
-  float spread = (map_view.eye.w > 0.5) ? 1.0 : depth;
+  float spread = view_is_parallel(map_view.eye) ? 1.0 : depth;
   return map_view.eye.xyz + spread * across - depth * map_view.backward.xyz;
 }
 
@@ -46,7 +47,7 @@ vec3 irradiance_at(vec3 position, vec3 normal, ivec2 corner)
     return vec3(0.0);
   }
   // The light is on the side that the hit faces.
-  vec3 to_light = (map_view.eye.w > 0.5) ? map_view.backward.xyz : map_view.eye.xyz - position;
+  vec3 to_light = view_is_parallel(map_view.eye) ? map_view.backward.xyz : map_view.eye.xyz - position;
   if (dot(normal, to_light) <= 0.0) {
     return vec3(0.0);
   }

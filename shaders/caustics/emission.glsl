@@ -1,5 +1,6 @@
 // What a texel of a light's view stands for, and how wide lobes are; `film_view` is the light's view.
 // Leaves out links: light that comes by way of surfaces reaches every receiver.
+#include "ask/view.glsl"
 #include "lib/random.glsl"
 #include "ask/media.glsl"
 
@@ -13,7 +14,7 @@ vec3 passing_media(vec3 origin, vec3 direction, float limit)
 // Flux through a texel at a place that it shows, W: what arrives through media across the light's direction times the texel's area there.
 vec3 texel_flux(vec3 position, out vec3 direction, out float away, out float area)
 {
-  bool parallel = film_view.eye.w > 0.5;
+  bool parallel = view_is_parallel(film_view.eye);
   vec3 way = position - film_view.eye.xyz;
   away = parallel ? dot(way, -film_view.backward.xyz) : length(way);
   direction = parallel ? -film_view.backward.xyz : way / max(away, 1e-30);

@@ -1,5 +1,6 @@
 // Footprints of photons: the ellipse that a photon's neighbours on the grid span about it (addon/lighting/photons.py), as
 // records of addon/kernels/splats.py. `film_view`: the view into which they will be drawn.
+#include "ask/view.glsl"
 #include "lib/math.glsl"
 
 // Adds the ways to two neighbours along one axis of the grid to the ellipse; false where neither is of the same bundle.
@@ -52,9 +53,7 @@ void main()
   float alone = float(!along_x) + float(!along_y);
   ellipse += vec3(1.0, 0.0, 1.0) * (0.5 * alone * flux.w * flux.w);
   ellipse *= widening * widening;
-  bool parallel = film_view.eye.w > 0.5;
-  float pixel = (film_view.frame.y - film_view.frame.x) / film_view.film.x
-                * (parallel ? 1.0 : abs(dot(film_view.row_w, vec4(point.xyz, 1.0))));
+  float pixel = view_pixel() * view_growth_ahead(point.xyz);
   // Epanechnikov's kernel of radius h has the variance h^2 / 6, a disc of radius r r^2 / 4.
   float least = least_pixels * least_pixels * pixel * pixel + 1.5 * facing.w * facing.w;
   ellipse += vec3(least, 0.0, least);

@@ -3,6 +3,7 @@
 //
 // `film_view` is the view of the casters; surface_* hold what light meets first of them, behind_* what it would leave last if
 // it went straight. `map_view` is that of the receivers, receiver_* its images. Output as of caustics/photon.frag.glsl.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
@@ -94,7 +95,7 @@ void main()
   if (!(max_component(abs(flux)) > 0.0)) {
     return;
   }
-  bool parallel = film_view.eye.w > 0.5;
+  bool parallel = view_is_parallel(film_view.eye);
   vec3 weight;
   vec3 onward;
   float lobe_spread;

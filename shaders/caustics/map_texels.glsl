@@ -1,5 +1,6 @@
 // Where the map of a light's view shows a place, and how much each of the four texels around it counts. `map_view` is the
 // light's.
+#include "lib/view.glsl"
 struct MapPlace {
   bool inside;
   vec2 corner;
@@ -14,7 +15,7 @@ MapPlace map_place(vec3 position, ivec2 size)
   vec2 at = (vec2(dot(map_view.row_x, p), dot(map_view.row_y, p)) / max(w, 1e-30) * 0.5 + 0.5) * vec2(size) - 0.5;
   MapPlace place;
   place.inside = w > 0.0 && !any(lessThan(at, vec2(-1.0))) && !any(greaterThanEqual(at, vec2(size)));
-  place.texel = (map_view.frame.y - map_view.frame.x) / map_view.film.x * ((map_view.eye.w > 0.5) ? 1.0 : w);
+  place.texel = (map_view.frame.y - map_view.frame.x) / map_view.film.x * (view_is_parallel(map_view.eye) ? 1.0 : w);
   place.corner = floor(at);
   place.share = at - place.corner;
   return place;

@@ -6,6 +6,7 @@
 //   point   xyz where the photon ends; w: its path and the material there as a number above 0; 0: none
 //   normal  xyz of the triangle, towards the photon; w: blur that light and lobes leave to it, m
 //   flux    rgb, W; w: how far neighbours would be if nothing had bent them, m
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
@@ -100,7 +101,7 @@ void main()
     return;
   }
 
-  bool parallel = film_view.eye.w > 0.5;
+  bool parallel = view_is_parallel(film_view.eye);
   float away;
   float area;
   vec3 direction;

@@ -1,7 +1,7 @@
 // Light without the surface's colour, and the variance of its mean: from what two halves of the samples differ by, a
 // single number per pixel, as its mean over 3x3 pixels of the same surface. Variance below 0: nothing to filter.
-#include "denoise/alike.glsl"
 #include "lib/math.glsl"
+#include "denoise/alike.glsl"
 #ifdef GRASS
 #include "lib/closure.glsl"
 #endif

@@ -1,8 +1,8 @@
 // One level of the edge-avoiding wavelet: 5x5 pixels `stride` apart, of those that show the same surface and differ by
 // what their variances explain. Pairs of pixels exchange light: what one gives the other takes, so none is lost, however
 // skewed the noise is. Carries the variance of what comes out.
-#include "denoise/alike.glsl"
 #include "lib/math.glsl"
+#include "denoise/alike.glsl"
 
 const float UNSEEN = 0.004;  // a standard error below this share of the light is left as it is
 const float EQUAL = 0.01;    // share of the light by which pixels may differ in any case

@@ -1,5 +1,7 @@
 // The eye's projection without near and far plane: w = 0 is a direction, a vertex at infinity. The depth measure is made
 // constant, as what lies before a receiver is decided by planes.
+#include "ask/view.glsl"
+
 vec4 project_flat(vec3 p, float finite_point)
 {
   vec4 h = vec4(p, finite_point);

@@ -12,7 +12,7 @@ vec4 record_texel(int index)
 float eye_side(vec3 v0, vec3 v1)
 {
   vec3 eye = edge_light.eye.xyz;
-  if (edge_light.eye.w < 0.5) {
+  if (!view_is_parallel(film_view.eye)) {
     return centre_side(v0 - eye, v1 - eye, towards_centre(eye));
   }
   if (light_at_infinity()) {

@@ -1,5 +1,6 @@
 // Where shadows of one light are asked for: points just beside the surfaces, on the side that the light is expected from.
 // w: +1; -1 where light shines through and the point lies behind the surface; 0: nothing to ask, as no light arrives.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "light/terminator.glsl"
 #include "edges/light.glsl"
@@ -7,8 +8,7 @@
 // How far beside a surface: what float32 positions of this size cannot tell apart (as in trace/rays.glsl).
 float receiver_offset(vec3 position)
 {
-  float away = (film_view.eye.w > 0.5) ? film_view.frame.y - film_view.frame.x : length(position - film_view.eye.xyz);
-  return max(edge_light.size.w, 2e-5 * away);
+  return max(edge_light.size.w, 2e-5 * view_reach(position));
 }
 
 void main()

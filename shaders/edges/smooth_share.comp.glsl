@@ -1,5 +1,6 @@
 // Mean over the sixteen patterns of neighbouring pixels, of those that lie on the same plane: shares that they found by
 // different points of the light together. Neighbours whose share differs by more than patterns do are left out. Five by five pixels, the rim counted half, hold each pattern equally often.
+#include "ask/view.glsl"
 #include "lib/math.glsl"
 #include "edges/light.glsl"
 
@@ -12,8 +13,7 @@ void main()
   }
   vec4 receiver = receivers_fetch(pixel);
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
-  float away = (film_view.eye.w > 0.5) ? 1.0 : length(receiver.xyz - film_view.eye.xyz);
-  float pixel_size = away * (film_view.frame.y - film_view.frame.x) / film_view.film.x;
+  float pixel_size = view_growth(receiver.xyz) * view_pixel();
   // What two patterns differ by in a penumbra; by more than that shadow itself varies.
   float noise = 0.5 * inversesqrt(float(edge_light.point_count));
   float own = raw_share_fetch(pixel).x;

@@ -12,7 +12,7 @@ void main()
   vec4 plane = record_texel(4 * gl_InstanceID + 3);
   flat_a = plane;
   float centre = light_at_infinity() ? dot(plane.xyz, edge_light.centre.xyz) : plane_side(plane, edge_light.centre.xyz);
-  float eye = (edge_light.eye.w > 0.5) ? dot(plane.xyz, edge_light.eye.xyz) : plane_side(plane, edge_light.eye.xyz);
+  float eye = view_is_parallel(film_view.eye) ? dot(plane.xyz, edge_light.eye.xyz) : plane_side(plane, edge_light.eye.xyz);
   flat_b = vec4(centre, eye, record_texel(4 * gl_InstanceID).w, 0.0);
   gl_Position = project_flat(record_texel(4 * gl_InstanceID + number).xyz, 1.0);
 }

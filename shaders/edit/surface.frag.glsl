@@ -1,4 +1,5 @@
 // The rotation of what an edited object mirrors or bends, as a quaternion, where the picture shows it.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "generated/distances"
 #include "edit/solve.glsl"
@@ -24,8 +25,7 @@ void main()
       || max_component(surface_tint_fetch(pixel).rgb) <= 0.0) {
     discard;
   }
-  bool orthographic = film_view.eye.w > 0.5;
-  vec3 viewer = orthographic ? film_view.backward.xyz : safe_normalize(to_eye);
+  vec3 viewer = view_toward(seen.xyz);
   Surface s = SURFACE_READ(pixel);
   // Of glass whose both ways are in one picture, what an edit of its own is about: what passes, where there is one of that.
   bool mirrored = surface_goes_both_ways(s) && edits.shape.y < 0.5;

@@ -4,6 +4,7 @@
 // REPEATED: where the nearest own point lies elsewhere, and the light of pixels around that lie there is not even, direct
 // light is left out, but for that through glass, and the pixel marked by its depth (lighting/repeated_light.py).
 // WRITE_ALL: light paths to the images that are drawn, several summed up in one (film/points.py).
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 
@@ -26,7 +27,7 @@ struct Seen {
 // weights alone would be far too bright.
 vec3 lobe_reflectance(Surface s)
 {
-  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 to_viewer = view_toward(s.position);
   float cosine = clamp(abs(dot(s.glossy_normal, to_viewer)), 0.0, 1.0);
   if (s.kind == FRESNEL_DIELECTRIC) {
     float least = dielectric_f0(s.glossy_ior);

@@ -8,7 +8,7 @@
 #include "lib/soft_lobe.glsl"
 #endif
 #include "lib/environment.glsl"
-#include "film/view_direction.glsl"
+#include "ask/view.glsl"
 #include "light/sources.glsl"
 
 void main()
@@ -23,11 +23,7 @@ void main()
   out_transmission_color = vec4(0.0);
   out_normal = vec4(0.0);
   vec3 direction = view_direction(gl_FragCoord.xy);
-  vec3 origin = film_view.eye.xyz;
-  if (film_view.eye.w > 0.5) {
-    vec2 on_frame = mix(film_view.frame.xz, film_view.frame.yw, (gl_FragCoord.xy + vec2(film_view.right.w, film_view.up.w)) / film_view.film.xy);
-    origin += on_frame.x * film_view.right.xyz + on_frame.y * film_view.up.xyz;
-  }
+  vec3 origin = view_origin(gl_FragCoord.xy);
   float limit = 1e30;
   float coverage = 0.0;
   if (s.hit) {
@@ -37,9 +33,7 @@ void main()
     out_diffuse_color.rgb = s.diffuse;
     out_normal = vec4(s.normal, 1.0);
     if (mist.w > 0.0) {
-      vec3 away = film_view.eye.xyz - s.position;
-      float far = (film_view.eye.w > 0.5) ? dot(away, film_view.backward.xyz) : length(away);
-      float share = clamp((far - mist.x) * mist.y, 0.0, 1.0);
+      float share = clamp((view_distance(s.position) - mist.x) * mist.y, 0.0, 1.0);
       // Exact for the powers that Blender has: that of a card is good to five digits.
       out_diffuse_color.a = (mist.z == 2.0) ? share * share : (mist.z == 0.5) ? sqrt(share) : pow(share, mist.z);
     }
@@ -78,11 +72,14 @@ void main()
       out_normal.xyz = s.glossy_normal;
     }
   }
-  else {
+  else if (view_sees(gl_FragCoord.xy)) {
 #ifdef WORLD
     out_environment.rgb = (world_light.color.w > 0.5) ? environment_radiance(direction) * s.emission : vec3(0.0);
 #endif
     coverage = 1.0 - world_light.map_options.x;
+  }
+  else {
+    coverage = 1.0;  // beside a fisheye's circle Cycles has black, which is no hole in a transparent film either
   }
   out_environment.a = coverage;
 #if LIGHT_KINDS != 0

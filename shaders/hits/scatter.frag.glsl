@@ -1,5 +1,6 @@
 // Rays of the lobes that surfaces have kept: mirrored up to `shaded_roughness`, or bent. Of what the camera sees, or, with
 // ONWARD, of what rays have met. `travelled`: how far light samples of the last lobe were from where the ray starts, m.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/refraction.glsl"
@@ -42,10 +43,8 @@ void main()
     return;
   }
 #else
-  bool orthographic = film_view.eye.w > 0.5;
-  vec3 path = film_view.eye.xyz - s.position;
-  vec3 viewer = orthographic ? film_view.backward.xyz : safe_normalize(path);
-  float width = (film_view.frame.y - film_view.frame.x) / film_view.film.x * (orthographic ? 1.0 : length(path));
+  vec3 viewer = view_toward(s.position);
+  float width = view_pixel() * view_growth(s.position);
   vec3 throughput = vec3(1.0);
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
   bool clear = true;

@@ -1,6 +1,7 @@
 // Indirect light of this sample: virtual lights, bounded where they are near, and rays for what the bound leaves out
 // (near.glsl). With SHARED, regions of pixels have gathered the virtual lights (region_gather.comp.glsl). Lobes up to
 // `shaded_roughness` see what rays meet with its own materials (hits/).
+#include "ask/view.glsl"
 #include "indirect/near.glsl"
 #ifndef SHARED
 #include "indirect/traced_gather.glsl"
@@ -18,7 +19,7 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
-  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 to_viewer = view_toward(s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 7);
   bool scatters = max_component(s.diffuse) > 0.0;

@@ -3,6 +3,7 @@
 // A program that includes this binds the surface images, `film_view`, `sources`, the hierarchy and `reflectance`, and has
 // the constants `light_count` and `offset_size`.
 // Leaves out links: light that comes by way of surfaces reaches every receiver.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "light/sources.glsl"
@@ -39,21 +40,20 @@ bool pixel_of(vec3 position, vec3 normal, out ivec2 pixel, out float slant, out 
 {
   pixel = ivec2(0);
   slant = footprint = 0.0;
-  vec4 p = vec4(position, 1.0);
-  float w = dot(film_view.row_w, p);
-  if (w <= 0.0) {
+  vec2 share;
+  if (!view_place(position, share)) {
     return false;
   }
   vec2 size = vec2(surface_position_size());
-  vec2 place = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * size;
+  vec2 place = share * size;
   if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) {
     return false;
   }
   pixel = ivec2(place);
-  vec3 to_eye = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - position);
+  vec3 to_eye = view_toward(position);
   slant = max(dot(normal, to_eye), 0.0);
   // The pixel's own point lies within its footprint, stretched where the surface is seen from the side.
-  footprint = 1.5 * (film_view.frame.y - film_view.frame.x) / film_view.film.x * w / max(slant, 0.1);
+  footprint = 1.5 * view_pixel() * view_growth_ahead(position) / max(slant, 0.1);
   return slant > 0.0;
 }
 

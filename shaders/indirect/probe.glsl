@@ -2,6 +2,7 @@
 // Those that show glass stand for what is straight behind it, and those that show metal for what is mirrored there: a
 // virtual light sends to all sides what its probe saw of it, and of two mirrors one sees highlights of lamps in the other
 // that nothing else sees. A program includes indirect/path.glsl before.
+#include "ask/view.glsl"
 #define MOST_MIRRORS 4  // one behind another, that a probe looks at
 #define WIDE_LOBE 0.55  // roughness from which a lobe sends its light about as far around as a virtual light does
 
@@ -32,7 +33,7 @@ Probe probe_read(int index)
   probe.geometric_normal = s.geometric_normal;
   bool glass = s.kind == LOBE_REFRACTION;
   if (probe.receives && (glass || (s.kind <= FRESNEL_F82 && s.glossy_roughness < WIDE_LOBE && is_metal(s.diffuse, s.glossy_weight * s.glossy_tint)))) {
-    vec3 onward = (film_view.eye.w > 0.5) ? -film_view.backward.xyz : safe_normalize(s.position - film_view.eye.xyz);
+    vec3 onward = -view_toward(s.position);
     uint salt = bits.z + uint(film_view.sample_index);
     vec3 beside = s.geometric_normal;
     if (glass) {

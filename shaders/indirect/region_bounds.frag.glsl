@@ -6,6 +6,7 @@
 // A region is split where depth or normal differ too much within it, where a silhouette runs through it, at the border of
 // the picture (what is interpolated ends there, what lights it does not), and where a neighbour is split down to its own
 // finer level: neighbours then differ by one level at most.
+#include "ask/view.glsl"
 #include "lib/math.glsl"
 
 void main()
@@ -24,7 +25,7 @@ void main()
         kinds |= 2;
         continue;
       }
-      float depth = dot(film_view.backward.xyz, film_view.eye.xyz - position.xyz);
+      float depth = view_depth(position.xyz);
       vec4 value = vec4(depth, octahedral_decode(surface_normal_fetch(pixel).xy));
       out_low = min(out_low, value);
       out_high = max(out_high, value);
@@ -41,7 +42,7 @@ void main()
 #endif
   bool split = kinds == 3;
   if ((kinds & 1) != 0) {
-    float scale = (film_view.eye.w > 0.5) ? depth_scale : out_low.x;
+    float scale = view_is_parallel(film_view.eye) ? depth_scale : out_low.x;
     vec4 range = out_high - out_low;
     split = split || range.x > depth_step * scale || max_component(range.yzw) > normal_step;
   }

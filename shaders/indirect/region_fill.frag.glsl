@@ -1,6 +1,7 @@
 // Irradiance in all regions of one level, from what some have gathered. PULL, from fine to coarse: regions that are split
 // get the mean of their quarters. Else, from coarse to fine: regions that a larger one covers interpolate between it and
 // its neighbours. Alpha tells whether there is a surface.
+#include "ask/view.glsl"
 #include "indirect/regions.glsl"
 
 vec3 normal_at(ivec2 pixel)
@@ -35,7 +36,7 @@ void main()
   if (surface.w == 0.0) {
     return;
   }
-  float reach = 0.02 * ((film_view.eye.w > 0.5) ? depth_scale : max(length(surface.xyz - film_view.eye.xyz), 1e-30));
+  float reach = 0.02 * (view_is_parallel(film_view.eye) ? depth_scale : max(view_growth(surface.xyz), 1e-30));
   vec3 normal = normal_at(pixel);
   vec3 sum = vec3(0.0);
   float weights = 0.0;

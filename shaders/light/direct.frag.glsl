@@ -8,6 +8,7 @@
 //
 // KNOWN_IRRADIANCE: the lights are directions of the world, whose irradiance is known where nothing is in the way
 // (lib/known_irradiance.glsl); what arrived of the light that was drawn, and that, are left in w, for light/openness.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/brdf.glsl"
@@ -63,7 +64,7 @@ void main()
     return;
   }
   Surface s = surface_mirrored(SURFACE_READ(pixel));
-  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 to_viewer = view_toward(s.position);
   GrassSeen grass = grass_see(pixel, s);
   bool has_diffuse = max_component(s.diffuse) > 0.0;
   bool has_glossy = s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;

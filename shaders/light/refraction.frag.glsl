@@ -7,6 +7,7 @@
 //
 // What the first interface lets arrive is direct; all else is indirect, as in Cycles' passes.
 // Leaves out links: in media and through glass light reaches every receiver.
+#include "ask/view.glsl"
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
@@ -133,7 +134,7 @@ void main()
   if (s.kind != LOBE_REFRACTION) {
     return;
   }
-  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 to_viewer = view_toward(s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 53u));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 13);
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));

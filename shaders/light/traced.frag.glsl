@@ -1,6 +1,7 @@
 // Direct light of narrow glossy lobes: one ray per pixel, drawn from the lobe. What it reaches first, a light or the
 // world, counts with the power-heuristic share that light/direct.frag.glsl leaves; what blocks it counts nothing,
 // since light from surfaces is indirect.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "lib/environment.glsl"
@@ -62,7 +63,7 @@ void main()
   if (s.glossy_roughness > traced_roughness || s.kind > FRESNEL_F82) {
     return;
   }
-  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 to_viewer = view_toward(s.position);
   Lobe lobe = lobe_begin(s, to_viewer);
   bool mirror = lobe_is_mirror(lobe);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u));

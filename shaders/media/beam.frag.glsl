@@ -3,6 +3,7 @@
 // A ray of flux F deposits in a view ray that it passes at an angle gamma the radiance F sigma_s p T T k(u) / sin gamma, u
 // the distance of the two lines and k a tent of area 1 (photon beams with a 1-D kernel, Jarosz et al. 2011): nothing in it
 // depends on how many rays or pixels there are.
+#include "ask/view.glsl"
 #include "media/bins.glsl"
 #include "media/view_ray.glsl"
 
@@ -30,8 +31,8 @@ void main()
     discard;
   }
   float off = length(position - ray.origin - along_view * ray.direction);
-  float pixel_size = abs(film_view.frame.y - film_view.frame.x) / film_view.film.x;
-  pixel_size *= (film_view.eye.w > 0.5) ? 1.0 : (ray.before + along_view) * max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
+  float pixel_size = abs(view_pixel());
+  pixel_size *= view_is_parallel(film_view.eye) ? 1.0 : (ray.before + along_view) * max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
   float wide = clamp(beam_flux.w, beam_pixels * pixel_size, beam_most_pixels * pixel_size);
   float tent = max(1.0 - off / wide, 0.0) / wide;
   if (!(tent > 0.0)) {

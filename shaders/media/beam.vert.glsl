@@ -1,4 +1,5 @@
 // A stretch of a light ray as a quad on the screen, wide enough for its kernel. Empty ones are clipped.
+#include "ask/view.glsl"
 vec4 beam_clip(vec3 position)
 {
   vec4 place = vec4(position, 1.0);
@@ -15,7 +16,7 @@ void main()
   if (beam_start.w > 0.0 && any(notEqual(beam_flux.rgb, vec3(0.0)))) {
     vec4 a = beam_clip(beam_start.xyz);
     vec4 b = beam_clip(beam_end.xyz);
-    float near = (film_view.eye.w > 0.5) ? -1e30 : max(film_view.film.z, 1e-20);  // clipped before it is divided
+    float near = view_is_parallel(film_view.eye) ? -1e30 : max(film_view.film.z, 1e-20);  // clipped before it is divided
     bool seen = max(a.w, b.w) > near;
     if (seen) {
       vec4 first = (a.w < near) ? mix(a, b, (near - a.w) / (b.w - a.w)) : a;
@@ -29,7 +30,7 @@ void main()
       vec2 across = vec2(-unit.y, unit.x);
       // Half a pixel more than the kernel; the wider end of the beam for both.
       float scale = 0.5 * pixels.x / max(abs(film_view.frame.y - film_view.frame.x) * 0.5, 1e-20);
-      float nearest = (film_view.eye.w > 0.5) ? 1.0 : max(min(first.w, last.w), 1e-6);
+      float nearest = view_is_parallel(film_view.eye) ? 1.0 : max(min(first.w, last.w), 1e-6);
       float wide = min(max(beam_pixels, beam_flux.w * scale / nearest), beam_most_pixels) + 1.0;
       vec2 place = (corner.x < 0.0) ? p - unit * wide * 2.0 / pixels : q + unit * wide * 2.0 / pixels;
       place += corner.y * across * wide * 2.0 / pixels;

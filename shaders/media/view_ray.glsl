@@ -1,5 +1,5 @@
 // The view ray of a pixel, from the camera's clip start, where Cycles' rays begin, up to the surface that it sees.
-#include "film/view_direction.glsl"
+#include "ask/view.glsl"
 
 struct ViewRay {
   vec3 origin;
@@ -15,22 +15,17 @@ ViewRay view_ray(vec4 seen, vec2 place)
   ViewRay ray;
   ray.hit = seen.w != 0.0;
   ray.direction = view_direction(place);
-  ray.origin = film_view.eye.xyz;
-  if (film_view.eye.w > 0.5) {
-    vec2 on_frame = mix(film_view.frame.xz, film_view.frame.yw,
-                        (place + vec2(film_view.right.w, film_view.up.w)) / film_view.film.xy);
-    ray.origin += on_frame.x * film_view.right.xyz + on_frame.y * film_view.up.xyz;
-  }
-  ray.limit = FARTHEST_MEDIUM;
+  ray.origin = view_origin(place);
+  ray.limit = view_sees(place) ? FARTHEST_MEDIUM : 0.0;
   if (ray.hit) {
     vec3 away = seen.xyz - ray.origin;
     ray.limit = max(dot(away, ray.direction), 0.0);
-    if (film_view.eye.w <= 0.5) {
+    if (!view_is_parallel(film_view.eye)) {
       ray.direction = safe_normalize(away);
       ray.limit = length(away);
     }
   }
-  ray.before = film_view.film.z / max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
+  ray.before = view_clip(ray.direction);
   ray.origin += ray.before * ray.direction;
   ray.limit = max(ray.limit - ray.before, 0.0);
   return ray;

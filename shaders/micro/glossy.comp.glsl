@@ -1,5 +1,6 @@
 // What pixels reflect of other surfaces by microfacets: a micro-buffer each, of rays of the lobe, block by block.
 #define GLOSSY
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "lib/random.glsl"
@@ -18,7 +19,7 @@ void main()
   if (s.kind > FRESNEL_F82 || max_component(s.glossy_weight) <= 0.0) {
     return;
   }
-  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 to_viewer = view_toward(s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 37u));
   vec3 own = fract(buffer_choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
   MicroFrame f = micro_frame(s.position, s.geometric_normal, s.geometric_normal, own);

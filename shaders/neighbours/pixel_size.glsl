@@ -1,6 +1,6 @@
 // Width of a pixel at a point that is seen, in the scene's units.
+#include "ask/view.glsl"
 float pixel_size_at(vec3 position)
 {
-  float depth = (film_view.eye.w > 0.5) ? 1.0 : distance(position, film_view.eye.xyz);
-  return (film_view.frame.y - film_view.frame.x) / film_view.film.x * depth;
+  return view_pixel() * view_growth(position);
 }

@@ -13,7 +13,7 @@ vec3 fan_light(Fan fan, Surface s, vec2 u, out uint open)
   uint taken = fan.below;
   open = ~fan.below;
   vec3 sum = vec3(0.0);
-  vec2 last = vec2(0.0, film_depth(fan.origin));
+  vec2 last = vec2(0.0, view_depth(fan.origin));
   for (int i = 0; i < step_count && taken != 0xFFFFFFFFu; i++) {
     Patch found;
     if (!fan_step(fan, i, fract(u + float(i) * vec2(0.6180339887, 0.7548776662)), last, found)) {
@@ -82,7 +82,7 @@ void main()
 #ifdef RAYS
   if (open_sectors > 0.0 && dot(chosen, s.geometric_normal) > 0.0) {
     vec3 found = path_radiance(ray_origin(s.position, s.geometric_normal), chosen, hash3(roll));
-    vec3 weight = diffuse_weight(s, viewer_direction(s.position), chosen);
+    vec3 weight = diffuse_weight(s, view_toward(s.position), chosen);
     out_arriving.rgb += found * weight * (open_sectors / (32.0 * float(fan_count)));
   }
 #endif

@@ -11,6 +11,7 @@
 //
 // A program that includes this binds the surface images and `film_view`, and has the constants `fan_count`,
 // `step_count`, `farthest` and `thickness` (both in metres).
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "lib/random.glsl"
@@ -107,24 +108,18 @@ uint fan_sectors(Fan fan, float from, float to)
 // The ray through a place of the film, in pixels; its direction is one metre long along the camera's axis.
 vec3 film_ray(vec2 place, out vec3 origin)
 {
-  vec2 on_film = (place + vec2(film_view.right.w, film_view.up.w)) / film_view.film.xy;
-  vec2 on_frame = mix(film_view.frame.xz, film_view.frame.yw, on_film);
+  vec2 on_frame = view_on_frame(place);
   vec3 aside = on_frame.x * film_view.right.xyz + on_frame.y * film_view.up.xyz;
-  bool orthographic = film_view.eye.w > 0.5;
+  bool orthographic = view_is_parallel(film_view.eye);
   origin = film_view.eye.xyz + (orthographic ? aside : vec3(0.0));
   return (orthographic ? vec3(0.0) : aside) - film_view.backward.xyz;
-}
-
-vec3 viewer_direction(vec3 position)
-{
-  return (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - position);
 }
 
 // The fan through a direction. False if the surface's hemisphere holds nothing of it.
 bool fan_begin(Surface s, vec2 place, vec3 direction, float rounding, out Fan fan)
 {
   fan.origin = s.position;
-  fan.toward = viewer_direction(s.position);
+  fan.toward = view_toward(s.position);
   vec3 bitangent;
   vec3 across = direction - dot(direction, fan.toward) * fan.toward;
   if (dot(across, across) > 1e-10) {
@@ -169,15 +164,9 @@ vec4 patch_point(Patch found, vec2 place, float width, out vec3 ray)
   float depth = dot(found.position - origin, -film_view.backward.xyz);
   float slope = dot(found.normal, ray);
   float met = dot(found.normal, found.position - origin) / min(slope, -1e-12);
-  float pixel = (film_view.frame.y - film_view.frame.x) / film_view.film.x;
-  float most = 32.0 * width * pixel * ((film_view.eye.w > 0.5) ? 1.0 : depth);
+  float most = 32.0 * width * view_pixel() * (view_is_parallel(film_view.eye) ? 1.0 : depth);
   float end = clamp(met, max(depth - most, 0.1 * depth), depth + most);
   return vec4(origin + ray * end, end);
-}
-
-float film_depth(vec3 position)
-{
-  return dot(film_view.eye.xyz - position, film_view.backward.xyz);
 }
 
 // Step number `index` of a fan, or false if it finds nothing within the radius. Steps widen with the distance. `last`:
@@ -195,7 +184,7 @@ bool fan_step(Fan fan, int index, vec2 u, inout vec2 last, out Patch found)
   }
   vec4 position = surface_position_fetch(found.texel);
   vec2 before = last;
-  last = vec2(at, (position.w == 0.0) ? 1e30 : film_depth(position.xyz));
+  last = vec2(at, (position.w == 0.0) ? 1e30 : view_depth(position.xyz));
   if (position.w == 0.0) {
     return false;
   }

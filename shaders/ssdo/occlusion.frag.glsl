@@ -15,7 +15,7 @@
 uint fan_hidden(Fan fan, vec2 u)
 {
   uint hidden = fan.below;
-  vec2 last = vec2(0.0, film_depth(fan.origin));
+  vec2 last = vec2(0.0, view_depth(fan.origin));
   for (int i = 0; i < step_count && hidden != 0xFFFFFFFFu; i++) {
     Patch found;
     if (fan_step(fan, i, fract(u + float(i) * vec2(0.6180339887, 0.7548776662)), last, found)) {

@@ -49,11 +49,11 @@ Blocker point_blocker(vec3 origin, vec3 direction, float share)
   // Depth of the surface's tangent plane on the point's ray, which is not that of the pixel's centre.
   vec3 ray_origin;
   vec3 ray = film_ray(place, ray_origin);
-  float depth = film_depth(found.position);
+  float depth = view_depth(found.position);
   float slope = dot(found.normal, ray);
   float met = dot(found.normal, found.position - ray_origin) / min(slope, -1e-12);
   bool edge_on = slope > -0.01 * length(ray);
-  if (film_depth(point.xyz) > (edge_on ? depth : met) + 2e-3 * farthest) {
+  if (view_depth(point.xyz) > (edge_on ? depth : met) + 2e-3 * farthest) {
     found.share = 1.0 - smoothstep(0.7 * farthest, farthest, distance(found.position, origin));
   }
   return found;

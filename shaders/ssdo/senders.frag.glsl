@@ -1,4 +1,5 @@
 // The radiance with which each pixel's surface lights others, the same to all sides.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
@@ -11,7 +12,7 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
-  vec3 viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 viewer = view_toward(s.position);
   vec3 whole = surface_albedo(s, max(dot(s.geometric_normal, viewer), 0.0));
 #ifdef FROM_LIGHT
   // What this sample found. Glossy reflection is added as even.

@@ -5,6 +5,7 @@
 //
 // So a walk is lit at each of its steps, for the one ray that a step costs. It enters as in Cycles, by the lobe of a rough
 // interface, and distances are drawn for one channel, weighed for all three (balance heuristic).
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "subsurface/walks.glsl"
@@ -78,7 +79,7 @@ void main()
     return;
   }
   vec4 entry = scatter_walk_fetch(pixel);
-  vec3 view = (film_view.eye.w > 0.5) ? film_view.backward.xyz : normalize(film_view.eye.xyz - position);
+  vec3 view = view_toward(position);
   vec3 start = ray_origin(position, -face);
 
   Below below = below_of(object.w, color, length_m.xyz);

@@ -1,5 +1,6 @@
 // Which part of a pixel's light below its surface random walks find, and where places lie in the picture. A program that includes
 // this binds `film_view`, `scatter_objects` and `surface_position`.
+#include "ask/view.glsl"
 
 #define DEEP 4.0
 #define DEEPER 12.0
@@ -11,21 +12,18 @@ vec4 object_texel(int index)
 
 float pixel_width_at(vec3 position)
 {
-  float w = dot(film_view.row_w, vec4(position, 1.0));
-  float across = (film_view.frame.y - film_view.frame.x) / film_view.film.x;
-  return (film_view.eye.w > 0.5) ? across : across * w;
+  return view_pixel() * view_growth_ahead(position);
 }
 
 bool pixel_seen(vec3 place, out ivec2 pixel)
 {
-  vec4 p = vec4(place, 1.0);
-  float w = dot(film_view.row_w, p);
+  vec2 share;
   pixel = ivec2(0);
-  if (w <= 0.0) {
+  if (!view_place(place, share)) {
     return false;
   }
   ivec2 size = surface_position_size();
-  pixel = ivec2(floor((vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * vec2(size)));
+  pixel = ivec2(floor(share * vec2(size)));
   return all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, size));
 }
 

@@ -1,4 +1,5 @@
 // What the surfaces of the surface images reflect, glossy reflection included, and where they are.
+#include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
@@ -10,7 +11,7 @@ void main()
   out_albedo = vec4(0.0);
   if (out_position.w != 0.0) {
     Surface s = SURFACE_READ(pixel);
-    vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+    vec3 to_viewer = view_toward(s.position);
     out_albedo.rgb = surface_albedo(s, max(dot(s.geometric_normal, to_viewer), 0.0));
   }
 }

@@ -3,6 +3,7 @@
 // layers to what the first surface from the threshold on has drawn.
 // generated/aovs: AOV_NONE and AOV_WRITE set the outputs, from functions of generated/material; Denoising Depth begins
 // at AOV_NEAR.
+#include "ask/view.glsl"
 #include "lib/math.glsl"
 #include "lib/closure.glsl"
 #include "lib/instance.glsl"
@@ -16,9 +17,8 @@
 // How far a camera's ray goes to a place from where it begins.
 float aov_distance(vec3 position)
 {
-  vec3 away = position - film_view.eye.xyz;
-  float depth = -dot(away, film_view.backward.xyz);
-  return (film_view.eye.w > 0.5) ? depth - AOV_NEAR : length(away) * (1.0 - AOV_NEAR / depth);
+  float depth = view_depth(position);
+  return view_is_parallel(film_view.eye) ? depth - AOV_NEAR : view_distance(position) * (1.0 - AOV_NEAR / depth);
 }
 
 void main()

@@ -1,11 +1,11 @@
 // The surface point of a fragment that the camera sees, and whether the surface images hide it.
+#include "ask/view.glsl"
 #include "surface/point.glsl"
 
 // Where a material finds its surface itself, fragments that miss it end here.
 SurfacePoint fragment_point(out Instance instance)
 {
-  vec3 eye = film_view.eye.xyz;
-  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
+  vec3 incoming = view_toward(world_position);
   instance = instance_read(instance_flat.x);
   SurfacePoint point = surface_point(incoming, instance);
 #ifdef OWN_SURFACE
@@ -22,10 +22,9 @@ SurfacePoint fragment_point(out Instance instance)
 // hidden.
 bool fragment_hidden(vec3 position, float slack)
 {
-  vec3 eye = film_view.eye.xyz;
-  float depth = dot(eye - position, film_view.backward.xyz);
+  float depth = view_depth(position);
   vec4 hit = surface_position_fetch(ivec2(gl_FragCoord.xy));
-  float hit_depth = dot(eye - hit.xyz, film_view.backward.xyz);
-  bool behind = hit.w != 0.0 && depth > hit_depth + slack * 1e-6 * (abs(hit_depth) + length(hit.xyz - eye));
+  float hit_depth = view_depth(hit.xyz);
+  bool behind = hit.w != 0.0 && depth > hit_depth + slack * 1e-6 * (abs(hit_depth) + length(hit.xyz - film_view.eye.xyz));
   return behind || depth < film_view.film.z || depth > film_view.film.w;
 }

@@ -1,6 +1,6 @@
 // How what lies infinitely far behind all moves in the picture: as the camera turns and zooms. VECTOR_OUT, HIT_OUT: the
 // outputs of passes of surfaces (techniques/shader_aovs.py) that hold it and count it.
-#include "film/view_direction.glsl"
+#include "ask/view.glsl"
 #include "surface/motion.glsl"
 
 vec3 motion_far(int camera, vec3 direction)

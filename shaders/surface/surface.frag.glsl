@@ -1,5 +1,6 @@
 // Surface pass: evaluates the material and stores its closures. Transparency is stochastic: a layer is drawn with the
 // probability of its opacity, so that the mean over samples is exact alpha blending.
+#include "ask/view.glsl"
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "lib/gbuffer.glsl"
@@ -15,8 +16,7 @@
 
 void main()
 {
-  vec3 eye = film_view.eye.xyz;
-  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
+  vec3 incoming = view_toward(world_position);
   Instance instance = instance_read(instance_flat.x);
   SurfacePoint point = surface_point(incoming, instance);
 #ifdef OWN_CLOSURES
@@ -31,7 +31,7 @@ void main()
   }
   gl_FragDepth = projected_depth(point.position, PROJECTION);
 #endif
-  float depth = dot(eye - point.position, film_view.backward.xyz);
+  float depth = view_depth(point.position);
   if (depth < film_view.film.z || depth > film_view.film.w) {
     discard;
   }

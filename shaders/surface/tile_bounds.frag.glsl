@@ -1,4 +1,5 @@
 // Bounds of the positions in a tile of pixels; w: least and greatest depth. Empty tiles give low > high.
+#include "ask/view.glsl"
 void main()
 {
   ivec2 size = surface_position_size();
@@ -11,7 +12,7 @@ void main()
       if (pixel.x < size.x && pixel.y < size.y) {
         vec4 position = surface_position_fetch(pixel);
         if (position.w != 0.0) {
-          vec4 place = vec4(position.xyz, dot(film_view.eye.xyz - position.xyz, film_view.backward.xyz));
+          vec4 place = vec4(position.xyz, view_depth(position.xyz));
           low = min(low, place);
           high = max(high, place);
         }

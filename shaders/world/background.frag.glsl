@@ -1,7 +1,7 @@
 // The world's tree behind all surfaces, as the camera sees it, through the coloured layers before it.
 #include "lib/math.glsl"
 #include "lib/closure.glsl"
-#include "film/view_direction.glsl"
+#include "ask/view.glsl"
 #include "generated/material"
 #include "world/point.glsl"
 

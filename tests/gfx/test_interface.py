@@ -28,8 +28,12 @@ def lit_programs():
     return [lighting(lookups[name], soft) for name in sorted(lookups) for soft in (False, True)]
 
 
+def asks(program):
+    return [one for one in INTERFACES if one.asked in asked_by(program)]
+
+
 def subsets(program):
-    there = [one for one in INTERFACES if one.asked in asked_by(program)]
+    there = asks(program)
     return chain.from_iterable(combinations(there, count) for count in range(len(there) + 1))
 
 
@@ -67,10 +71,10 @@ def test_a_program_that_reads_lights_asks_what_dims_them_or_says_why_not():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", sorted({one.fragment or one.compute for one in programs() if asked_by(one)}))
+@pytest.mark.parametrize("file", sorted({one.fragment or one.compute for one in programs() if asks(one)}))
 def test_a_shader_compiles_without_and_with_all_that_it_asks(file, gpu_context):
     """One program of each shader that asks: a file that forgets an include finds it in the other's."""
-    program = next(one for one in programs() if file in (one.fragment, one.compute) and asked_by(one))
+    program = next(one for one in programs() if file in (one.fragment, one.compute) and asks(one))
     *_, everything = subsets(program)
     for present in ((), everything):
         get(answered(program, present))

@@ -89,9 +89,21 @@ def test_degenerate_camera_matrices_stay_rigid(stage, scale):
     assert np.allclose(axes.T @ axes, np.eye(3), atol=1e-6)
 
 
-def test_panoramic_cameras_are_refused_with_a_sentence(stage):
-    stage.camera("Dome").data.type = "PANO"
-    with pytest.raises(UnsupportedScene, match=r"Camera 'Dome'.*Perspective"):
+def test_the_projection_of_a_panoramic_camera_is_read(stage):
+    lens = stage.camera("Dome").data
+    lens.type, lens.panorama_type, lens.fisheye_fov, lens.fisheye_lens = "PANO", "FISHEYE_EQUISOLID", 3.0, 8.0
+    lens.sensor_width = 30.0
+    camera = made(stage, 64, 48)
+    assert camera.kind == "PANORAMIC"
+    assert camera.panorama.projection == "FISHEYE_EQUISOLID"
+    assert camera.panorama.values == pytest.approx((3.0, 8.0, 30.0, 22.5))
+    lens.panorama_type, lens.longitude_min, lens.latitude_max = "EQUIRECTANGULAR", -1.0, 0.5
+    assert made(stage, 64, 48).panorama.values == pytest.approx((-1.0, np.pi, -np.pi / 2, 0.5))
+
+
+def test_lenses_that_are_programs_are_refused_with_a_sentence(stage):
+    stage.camera("Dome").data.type = "CUSTOM"
+    with pytest.raises(UnsupportedScene, match=r"Camera 'Dome'.*OSL.*Perspective"):
         stage.take()
 
 

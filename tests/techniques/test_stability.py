@@ -340,9 +340,9 @@ def test_pictures_of_any_size_are_drawn(room, size):
     assert images["combined"][..., :3].max() > 0
 
 
-def test_a_panoramic_camera_is_refused_with_a_sentence(room):
-    room.camera.data.type = "PANO"
-    with pytest.raises(RenderFailed, match=r"Camera .* is not supported; choose Perspective or Orthographic"):
+def test_a_camera_that_is_a_program_is_refused_with_a_sentence(room):
+    room.camera.data.type = "CUSTOM"
+    with pytest.raises(RenderFailed, match=r"Camera .* is not supported, .*; choose Perspective, Orthographic"):
         room.stage.render(1, SIZE)
     room.camera.data.type = "PERSP"
     assert room.stage.render(1, SIZE)["combined"].max() > 0  # and the next render works
