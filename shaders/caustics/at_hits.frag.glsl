@@ -24,9 +24,17 @@ KeptView map_view;
 
 KeptView view_of_cell(int cell)
 {
-  return KeptView(kept_views.row_x[cell], kept_views.row_y[cell], kept_views.row_w[cell], kept_views.eye[cell],
-                  kept_views.right[cell], kept_views.up[cell], kept_views.backward[cell], kept_views.frame[cell],
-                  vec4(float(MAP_SIDE)));
+  KeptView view;
+  view.row_x = kept_views.row_x[cell];
+  view.row_y = kept_views.row_y[cell];
+  view.row_w = kept_views.row_w[cell];
+  view.eye = kept_views.eye[cell];
+  view.right = kept_views.right[cell];
+  view.up = kept_views.up[cell];
+  view.backward = kept_views.backward[cell];
+  view.frame = kept_views.frame[cell];
+  view.film = vec4(float(MAP_SIDE));
+  return view;
 }
 
 // Place that a texel of the map shows, `depth` along the view's axis.
