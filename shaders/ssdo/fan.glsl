@@ -11,6 +11,7 @@
 //
 // A program that includes this binds the surface images and `film_view`, and has the constants `fan_count`,
 // `step_count`, `farthest` and `thickness` (both in metres).
+// Leaves out panoramas: a fan is a straight line in the picture.
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"

@@ -2,18 +2,20 @@
 
 import re
 from collections import Counter
+from dataclasses import replace
 from itertools import chain, combinations
 
 import pytest
 
 from addon.gfx.interface import Interface, answered, asked_by
-from addon.gfx.library import MOST_TEXTURES, SHADER_ROOT, get, resolve
+from addon.gfx.library import FULLSCREEN_VERTEX, MOST_TEXTURES, SHADER_ROOT, get, resolve
 from addon.lighting.grass import GRASS
 from addon.lighting.leaving_light import LEAVES
 from addon.lighting.linked import LINKS
 from addon.lighting.loop import RAYS_WHERE_NEAR, lighting
 from addon.lighting.media import MEDIA
 from addon.lighting.visibility import Lookup
+from addon.scene.panorama import ANSWERS
 from addon.sources.lights import SOURCES
 from tests.gfx.declared import _found, programs
 
@@ -78,3 +80,18 @@ def test_a_shader_compiles_without_and_with_all_that_it_asks(file, gpu_context):
     *_, everything = subsets(program)
     for present in ((), everything):
         get(answered(program, present))
+
+
+def asks_view(program):
+    if "ask/view.glsl" not in asked_by(program) or program.vertex not in ("", FULLSCREEN_VERTEX):
+        return False
+    return "panoramas" not in LEAVES_OUT.findall(
+        resolve(program.fragment or program.compute, dict(program.snippets))[0]
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", sorted({one.fragment or one.compute for one in programs() if asks_view(one)}))
+def test_a_shader_that_asks_the_view_compiles_for_a_panoramic_camera(file, gpu_context):
+    program = next(one for one in programs() if file in (one.fragment, one.compute) and asks_view(one))
+    get(replace(program, snippets=(*program.snippets, *ANSWERS)))
