@@ -33,8 +33,8 @@ class Param:
     or each lamp, material or object (whose values come with the snapshot; see `own_value`).
 
     With `many` it is a list of groups of those parameters, a tuple of {name: value}. A vector with a `handle` (POINT or
-    DIRECTION, in the object's space) can be dragged in the 3D viewport. `image`: a name of an image data-block; `file`:
-    the path of a file.
+    DIRECTION, in the object's space) can be dragged in the 3D viewport. `image`, `object`: the name of such a
+    data-block; `file`: the path of a file.
     """
 
     name: str
@@ -49,6 +49,7 @@ class Param:
     many: tuple[Param, ...] = ()
     handle: str = ""
     image: bool = False
+    object: bool = False
     file: bool = False
     draft: bool | int | float | None = None  # its most in a draft: a picture of a moment, as of a view that moves
 

@@ -1,20 +1,35 @@
-"""Points of an object's surface that settings name: they follow the surface when it is deformed.
+"""Points that settings of an object name: those of its surface follow it when it is deformed, targets follow objects.
 
-Such a setting is a list entry with `point`, in the space of the object, and `triangle`. Where no triangle is given, the
-point belongs to the place of the undeformed mesh that is nearest to it, as it stands in the file before shape keys,
-armatures and other modifiers that keep the vertices, and is taken to where that place is now.
+An entry of a list that has `target` and `target_object` aims at that object's origin. One with `point`, in the space of
+the object, and `triangle` names a point of the surface. Where no triangle is given, the point belongs to the place of
+the undeformed mesh that is nearest to it, as it stands in the file before shape keys, armatures and other modifiers
+that keep the vertices, and is taken to where that place is now.
 """
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from .own_settings import Own
 
 
-def bound(own: Own, owner) -> Own:
-    """The settings with points where the evaluated object `owner` has taken them."""
+def targets(own: Own, owner) -> tuple[bpy.types.Object, ...]:
+    """Objects at which entries of an evaluated object's settings aim."""
+    return tuple(
+        entry.target_object
+        for name, value in own
+        if _is_list(value) and "target_object" in dict(value[0])
+        for entry in getattr(owner.candela, name)
+        if entry.target_object is not None
+    )
+
+
+def bound(own: Own, owner, depsgraph) -> Own:
+    """The settings with points where the evaluated object `owner`, or objects that are aimed at, have taken them."""
+    if targets(own, owner):
+        own = tuple((name, _aimed(name, value, owner, depsgraph)) for name, value in own)
     if not any(_asks(dict(entry)) for _, value in own if _is_list(value) for entry in value):
         return own
     before, now = _deformed(owner)
@@ -26,6 +41,19 @@ def bound(own: Own, owner) -> Own:
         (name, tuple(_moved(entry, tree, triangles, before, now) for entry in value) if _is_list(value) else value)
         for name, value in own
     )
+
+
+def _aimed(name: str, value, owner, depsgraph):
+    """A setting of `owner` with the targets of its entries, in its space, where the objects are that they name."""
+    if not _is_list(value) or "target_object" not in dict(value[0]):
+        return value
+    inverse, found = owner.matrix_world.inverted_safe(), []
+    for entry, given in zip(value, getattr(owner.candela, name)):
+        if given.target_object is not None:
+            there = inverse @ given.target_object.evaluated_get(depsgraph).matrix_world.translation
+            entry = tuple((key, tuple(there) if key == "target" else one) for key, one in entry)
+        found.append(entry)
+    return tuple(found)
 
 
 def _is_list(value) -> bool:

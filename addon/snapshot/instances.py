@@ -18,7 +18,7 @@ from operator import and_
 import bpy
 import numpy as np
 
-from .bound_points import bound
+from .bound_points import bound, targets
 from .cache import SnapshotCache
 from .hair import HairSystem, hair_systems
 from .own_settings import Own, own_settings
@@ -84,7 +84,7 @@ class ObjectFacts:
     smoke: bool  # a gas domain of a fluid simulation, whose mesh is not drawn
     linked: bool  # it, or its instancer, has collections of light linking
     asset: str  # name of the last ancestor
-    ancestors: tuple[int, ...]  # uids of the original parent, its parent, and so on
+    ancestors: tuple[int, ...]  # uids of the original parent, its parent, and so on, and of objects that it aims at
     group: str
     blurred: bool  # whether motion blur shows that it moves, or that its vertices do
     deforms: bool
@@ -148,6 +148,7 @@ def walk(
                     top = owner if parent is None else parent
                     ancestors = _ancestors(owner)
                     cuts = _is_holdout(top, view_layer if holdout else None)
+                    own = own_settings(owner)
                     # A holdout is one for the camera too, wherever it stands.
                     unseen = indirect_only and not cuts and top.indirect_only_get(view_layer=view_layer)
                     made = ObjectFacts(
@@ -162,13 +163,13 @@ def walk(
                         random=_random_of_name(original.name),
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
-                        own=bound(own_settings(owner), owner),
+                        own=bound(own, owner, depsgraph),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         smoke=domain_of(owner) is not None,
                         shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
                         linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
                         asset=ancestors[-1].name if ancestors else "",
-                        ancestors=tuple(one.original.session_uid for one in ancestors),
+                        ancestors=tuple(one.original.session_uid for one in (*ancestors, *targets(own, owner))),
                         group=owner.lightgroup,
                         blurred=_says(owner, parent, "use_motion_blur"),
                         deforms=_says(owner, parent, "use_deform_motion"),

@@ -51,6 +51,10 @@ CONSTRAINT = (
     Param("point", "Point", (0.0, 0.0, 0.0), "Point of the surface that shows the target", handle=POINT),
     Param("target", "Target", (0.0, 0.0, 1.0), "Point that is seen there, in object space", handle=POINT),
     Param(
+        "target_object", "Target Object", "",
+        "Object whose origin is the target, as an empty, a lamp or the child of a bone, wherever it moves", object=True,
+    ),
+    Param(
         "viewer", "Viewer", (0.0, -5.0, 0.0), "Viewpoint from which the constraint was made", unit="TRANSLATION"
     ),
     Param(

@@ -83,9 +83,9 @@ def _property(param: Param, **changes):
     if param.many:
         del common["default"], common["update"]
         return bpy.props.CollectionProperty(type=entry_group(param), **common)
-    if param.image:
+    if param.image or param.object:
         del common["default"]
-        return bpy.props.PointerProperty(type=bpy.types.Image, **common)
+        return bpy.props.PointerProperty(type=bpy.types.Image if param.image else bpy.types.Object, **common)
     if param.file:
         return bpy.props.StringProperty(**common, subtype="FILE_PATH")
     if isinstance(param.default, tuple):

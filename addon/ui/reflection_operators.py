@@ -76,6 +76,8 @@ def shading_normal(mesh, face: int, point: Vector, flat: Vector) -> Vector:
 def angle_of(entry, edited) -> float | None:
     """Radians by which a constraint turns what its point mirrors; None where that is not known."""
     point, viewer, target = (Vector(getattr(entry, name)) for name in ("point", "viewer", "target"))
+    if entry.target_object is not None:
+        target = edited.matrix_world.inverted_safe() @ entry.target_object.matrix_world.translation
     there = nearest(edited, point)
     if there is None:
         return None

@@ -628,6 +628,22 @@ def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees):
     assert found.mean() == pytest.approx(1.0, abs=2e-3) and found.min() > 0.9
 
 
+def test_a_target_follows_the_object_that_it_is_bound_to(stage):
+    """In one session, to the bit what a target at that place shows."""
+    mirror = mirror_scene(stage)
+    constrain(mirror, (0, 0, 0), (0, 0, 1), (0, -6, 3))
+    one = mirror.candela.reflection_editing_constraints[0]
+    empty = stage.link("Aim", None, (-3, 6, 2))
+    mirror.location.z, one.target_object = 0.1, empty
+    stage.render(1, (16, 16), bounces=2)
+    empty.location = (2, 5, 3)
+    bound = stage.render(1, (16, 16), bounces=2)["combined"]
+    one.target_object, one.target = None, (2, 5, 2.9)
+    assert np.array_equal(bound, stage.render(1, (16, 16), bounces=2)["combined"])
+    one.target = (-3, 6, 1.9)
+    assert not np.array_equal(bound, stage.render(1, (16, 16), bounces=2)["combined"])
+
+
 def test_a_constraint_follows_a_shape_key(stage):
     """Without a triangle it belongs to a place of the undeformed mesh: a ball that is moved takes it along."""
     ball = sphere(stage, stage.principled(Metallic=1.0, Roughness=0.0), rings=16)
@@ -641,6 +657,7 @@ def test_a_constraint_follows_a_shape_key(stage):
     for value in (0.0, 1.0):
         key.value = value
         bpy.context.view_layer.update()
-        own = bound(own_settings(ball), ball.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        own = bound(own_settings(ball), ball.evaluated_get(depsgraph), depsgraph)
         places.append(dict(dict(own)["reflection_editing_constraints"][0])["point"])
     assert places[0] == pytest.approx((0, -1, 0)) and places[1] == pytest.approx((0, 1, 0), abs=0.02)
