@@ -98,7 +98,8 @@ FOOTPRINTS = passes.fullscreen_program(
 )
 WIDENING = 1.25  # of footprints beside the way to the neighbours: the least that leaves no gaps (docs/caustics.md)
 FALL_KNOWN, FALL_GROWING = -1.0 / 5.0, -1.0 / 5.0  # exponents of the footprints' fall with samples
-FEW = 16  # samples of a light, below which each has several of its points, and of the lobes of one material all
+FEW = 16  # samples of a light, below which each has several of its points
+FEW_LOBES = 64  # and below which each has all lobes of a material: one of three colours too often is a tint
 VIEWS = 4  # of lights and casters in a sample, in the mean, where lights may take turns
 CHOICES = 0.569840291  # from one interface's number to the next, as in caustics/photon.frag.glsl
 WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
@@ -301,7 +302,8 @@ class Photons:
         strata = float(light.strata)
         if count == 1:
             u, later, strata = (0.5, 0.5), (0.5, 0.5), -1.0
-        parts = self._parts if count < FEW else 1  # of several lobes each by itself: one alone would tint all
+        # Of several lobes each by itself: one alone would tint all.
+        parts = self._parts if count < FEW_LOBES or light.strata < 0 else 1
         sources = self._sources.set([emitter.row(light.sample, 0, 0, light.weight / parts)])
         choice = frame.random_volume_at(light.index, "caustics/interface")[2]
         if parts > 1 and light.strata > 0:

@@ -368,9 +368,10 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
     // As one lobe, so that no sample lacks either of the two.
     vec3 mirror = scale * reflected / multiscatter_scale(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, mu);
     vec3 passing = scale * max(transmitted, vec3(0.0));
-    vec3 share = mirror / max(passing, vec3(1e-6));
     float most = largest(mirror);
     float share_of_most = most / max(largest(passing), 1e-6);
+    // A channel that glass neither mirrors nor lets pass has any share.
+    vec3 share = mix(mirror / max(passing, vec3(1e-6)), vec3(share_of_most), lessThanEqual(max(mirror, passing), vec3(0.0)));
     bool colored = largest(abs(share - vec3(share.x))) < 2e-3 * share.x;
     bool grey = largest(abs(mirror - vec3(most))) < 2e-3 * most;
     float ratio = colored ? share.x : share_of_most;
@@ -395,6 +396,13 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
   else {
     closure_transparent(closures, color * through);
   }
+}
+
+// Indices of refraction for red, green and blue (611, 549 and 464 nm, as of sRGB's primaries) of glass with the index `ior`
+// at 587.6 nm and an Abbe number: Cauchy's n = A + B / wavelength^2, which has (ior - 1) / abbe between 486.1 and 656.3 nm.
+vec3 dispersed_index(float ior, float abbe)
+{
+  return vec3(ior) + (ior - 1.0) / abbe * vec3(-0.1139, 0.2207, 0.9154);
 }
 
 // A wall that is thin against its surroundings: what enters leaves again in the same direction. Of a ray that is reflected
@@ -489,7 +497,8 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
 void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base_color, float metallic,
                        float roughness, float ior, float alpha, vec3 normal, float diffuse_roughness,
                        float specular_level, vec3 specular_tint, float anisotropy, float rotation, vec3 tangent,
-                       float transmission, float thin_wall, float subsurface, vec3 subsurface_radius,
+                       float transmission, float dispersion, float abbe, float thin_wall, float subsurface,
+                       vec3 subsurface_radius,
                        float subsurface_scale, float subsurface_ior, float subsurface_anisotropy,
                        int subsurface_method,
                        float coat_weight, float coat_roughness, float coat_ior, vec3 coat_tint,
@@ -537,6 +546,16 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
     if (thin_wall > 0.5) {
       shader_thin_wall(closures, point, w * through, base, max(specular_tint, vec3(0.0)), clamp(ior, 1.0, MOST_IOR), r,
                        mirror_normal, film_thickness, max(film_ior, 1e-5));
+    }
+    else if (dispersion > 0.0) {
+      // A glass for each color: light that has passed one is of that color.
+      vec3 indices = dispersed_index(clamp(ior, 1e-5, MOST_IOR), max(abbe, 1e-3) / dispersion);
+      for (int k = 0; k < 3; k++) {
+        vec3 color = vec3(float(k == 0), float(k == 1), float(k == 2));
+        add_glass(closures, point, w * through * color, vec3(1.0), sqrt(min(base, vec3(1.0))),
+                  max(specular_tint, vec3(0.0)), clamp(indices[k], 1e-5, MOST_IOR), r, mirror_normal, distribution,
+                  film_thickness, max(film_ior, 1e-5));
+      }
     }
     else {
       add_glass(closures, point, w * through, vec3(1.0), sqrt(min(base, vec3(1.0))), max(specular_tint, vec3(0.0)),

@@ -569,6 +569,27 @@ def test_colours_of_several_glasses_are_bent_as_if_each_stood_alone(stage):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(bpy.app.version < (5, 3), reason="Principled has no dispersion before Blender 5.3")
+def test_principled_glass_bends_blue_more_than_red(stage):
+    """Below a ball of Abbe number 4, as far away as red comes together, red is 1.6 times as bright as blue in the
+    middle (Cycles: 1.64), and all of the light is white."""
+    stage.floor()
+    made = stage.principled(Transmission_Weight=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1), IOR=1.5)
+    node = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    node.inputs["Transmission Dispersion Scale"].default_value = 1.0
+    node.inputs["Transmission Dispersion Abbe Number"].default_value = 4.0
+    ball(stage, made, segments=48)
+    stage.light("SUN", angle=0.2)
+    stage.camera_above(1.6)
+    stage.scene.candela.slot_indirect = "OFF"
+    light = stage.render(samples=8, size=(32, 32), bounces=2)["diffuse_indirect"][..., :3]
+    middle = light[14:18, 14:18].mean(axis=(0, 1))
+    assert middle[0] > middle[1] > middle[2]
+    assert middle[0] == pytest.approx(1.64 * middle[2], rel=0.2)
+    assert light.mean(axis=(0, 1)) == pytest.approx(light.mean(), rel=0.1)
+
+
+@pytest.mark.slow
 def test_normals_of_a_coarse_smooth_mesh_make_no_light(stage):
     """Shading normals bend light that a triangle of another slope meets: of a ball of few faces, smooth-shaded, as much
     arrives as of a fine one (Veach's factor of adjoint scattering)."""

@@ -14,6 +14,8 @@ Sources: Cycles' Principled closure; Blender manual, "Principled BSDF" (4.5, 5.2
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..energy import pane_passing
@@ -33,6 +35,9 @@ SUBSURFACE_METHODS = {"BURLEY": 0, "RANDOM_WALK": 1, "RANDOM_WALK_SKIN": 2, "RAN
 # About the longest scale of the profile over the radius: by these the points of light below surfaces are spread.
 SUBSURFACE_REACH = {"BURLEY": 0.24, "RANDOM_WALK": 3.0, "RANDOM_WALK_SKIN": 0.6, "RANDOM_WALK_LEGACY": 0.24}
 THIN_FILM = (Socket("Thin Film Thickness", "FLOAT", layer=True), Socket("Thin Film IOR", "FLOAT", 1.33))
+
+# Of red, green and blue: how far the index lies above that of yellow, in (ior - 1) / Abbe number.
+DISPERSION = (-0.1139, 0.2207, 0.9154)
 
 
 def _passing(sockets: dict[str, Estimate]) -> Estimate:
@@ -89,6 +94,19 @@ def _interface(sockets: dict[str, Estimate], color: Estimate, share: float = 1.0
     return Interface(tuple(color.mean), max(ior, 1e-5), min(max(roughness, 0.0), 1.0), share, multiple=multiple, **kind)
 
 
+def _dispersed(sockets: dict[str, Estimate], glass: Interface) -> Interface:
+    """One interface for each colour where glass has an Abbe number: `dispersed_index` of material/shader.glsl."""
+    scale, abbe = (float(sockets[f"Transmission Dispersion {name}"].mean[0]) for name in ("Scale", "Abbe Number"))
+    if not scale > 0.0:
+        return glass
+    found = None
+    for channel, shift in enumerate(DISPERSION):
+        color = tuple(value if k == channel else 0.0 for k, value in enumerate(glass.color))
+        ior = max(glass.ior + (glass.ior - 1.0) * scale / max(abbe, 1e-3) * shift, 1e-5)
+        found = replace(glass, color=color, ior=ior, mirrors_color=True).beside(found)
+    return found
+
+
 def _principled(sockets: dict[str, Estimate]) -> Summary:
     alpha = sockets["Alpha"].clipped()
     metallic = sockets["Metallic"].clipped()
@@ -102,7 +120,7 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
         transparency += through * root * _passing(sockets)
         tinted = not root.grey
         if not thin:
-            glass = _interface(sockets, root, float(through.mean.mean()))
+            glass = _dispersed(sockets, _interface(sockets, root, float(through.mean.mean())))
     emission = alpha * sockets["Emission Strength"]
     # Images are only looked at where they matter.
     if emission.high.any() or emission.low.any():
@@ -152,6 +170,8 @@ PRINCIPLED = Entry(
         Socket("Anisotropic Rotation", "FLOAT"),
         Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropic"),
         Socket("Transmission Weight", "FLOAT", layer=True),
+        Socket("Transmission Dispersion Scale", "FLOAT", layer=True),
+        Socket("Transmission Dispersion Abbe Number", "FLOAT", 20.0),
         Socket("Thin Wall", "FLOAT", layer=True),
         Socket("Subsurface Weight", "FLOAT", layer=True),
         Socket("Subsurface Radius", "VECTOR", (1.0, 0.2, 0.1)),
