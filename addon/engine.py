@@ -16,7 +16,7 @@ from functools import partial
 import bpy
 import numpy as np
 
-from . import final, main_loop, viewport
+from . import bake, final, main_loop, viewport
 from .frame import ledger as ledgers
 from .frame import slices
 from .frame.bands import QueueLimit, samples_in_parts
@@ -25,6 +25,7 @@ from .frame.run import Renderer
 from .frame.settings import Settings
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, shutter, take
+from .snapshot.baking import instance_of, seen_by_nobody, triangles_of
 from .snapshot.errors import unforeseen
 from .snapshot.motion import STEPS, Moment, read_moment
 from .snapshot.scene import Note, Snapshot, one_line
@@ -125,11 +126,13 @@ class CandelaEngine(bpy.types.RenderEngine):
             self.register_pass(scene, renderlayer, asked.name, len(asked.channels), asked.channels, asked.kind)
 
     def update(self, data, depsgraph):
-        """Read the scene while Blender keeps it locked."""
+        """Read the scene while Blender keeps it locked. It comes before a bake, too, which reads the scene itself."""
+        self._snapshot = self._moments = self._refused = None
+        if not self.resolution_x:
+            return
         started = time.perf_counter()
         scene = depsgraph.scene
         shared = session(scene, "preview" if self.is_preview else "final")
-        self._snapshot = self._moments = None
         self.update_stats("Candela", "Reading the scene")
         try:
             layer = depsgraph.view_layer
@@ -139,7 +142,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             if blurred:
                 self._moments = self._take_moments(depsgraph, shared, self._snapshot)
         except UnsupportedScene as error:
-            self._fail(str(error))
+            self._refused = str(error)  # said by `render`
         except Exception as error:  # Blender would print it and go on with a black picture
             self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
@@ -186,6 +189,8 @@ class CandelaEngine(bpy.types.RenderEngine):
         """Draw all samples and hand the passes to Blender. In background mode in the engine's own GPU context, which
         ends afterwards; in a window by its main loop (main_loop.py)."""
         snapshot = getattr(self, "_snapshot", None)
+        if getattr(self, "_refused", None):
+            self._fail(self._refused)
         if snapshot is not None:
             for eye in eyes(depsgraph.scene):
                 self._render(depsgraph, snapshot, eye)
@@ -301,6 +306,48 @@ class CandelaEngine(bpy.types.RenderEngine):
             self.update_result(result)
         return result
 
+    # ------------------------------------------------------------------------------------------------------ bake
+
+    def bake(self, depsgraph, object, pass_type, pass_filter, width, height):  # noqa: A002, as Blender names it
+        """Fill the texels of a target that show an object. Blender asks for each object and target."""
+        layer = depsgraph.view_layer
+        result = self.begin_result(0, 0, width, height, layer=layer.name, view="")
+        try:
+            pixels = self._baked(depsgraph, object, pass_type, pass_filter, result, width, height)
+            combined = _pass_of(result, "Combined")
+            combined.rect.foreach_set(np.ascontiguousarray(pixels[..., : combined.channels], np.float32).ravel())
+            self.end_result(result)
+        except InterruptedError:
+            self.end_result(result, cancel=True)
+        except (ValueError, RuntimeError, UnsupportedScene) as error:
+            self.end_result(result, cancel=True)
+            self._fail(str(error))
+        except Exception as error:
+            self.end_result(result, cancel=True)
+            self._fail_unforeseen(error)
+
+    def _baked(self, depsgraph, thing, kind: str, what: int, result, width: int, height: int) -> np.ndarray:
+        scene, shared = depsgraph.scene, session(depsgraph.scene, "bake")
+        from_camera = scene.render.bake.view_from == "ACTIVE_CAMERA" and scene.camera is not None
+        view = None if from_camera else seen_by_nobody()
+        snapshot = take(depsgraph, shared.cache, width, height, camera=scene.camera, view=view)
+        instance = instance_of(snapshot, thing)
+        mesh = snapshot.meshes[instance.mesh]
+        primitive, differential = (
+            _pixels(_pass_of(result, name), height, width) for name in ("BakePrimitive", "BakeDifferential")
+        )
+        rows = bake.rows_of(mesh, triangles_of(thing, depsgraph))
+        points = replace(bake.places(primitive, differential, rows, instance.key), through_camera=from_camera)
+        if not (points.triangle >= 0).any():
+            return np.zeros((height, width, 4), np.float32)
+        if kind in bake.BY_MESH:
+            return bake.by_mesh(kind, instance, mesh, points)
+        settings = settings_of(scene, viewport=False, layer=depsgraph.view_layer, depsgraph=depsgraph)
+        parts = _whole_samples if bpy.app.background else samples_in_parts
+        draw = bake.drawing(shared.renderer, parts, main_loop.taken, self.test_break)
+        self.update_stats("Candela", f"Baking {thing.name}")
+        return bake.baked(kind, what, bake.prepared(snapshot, points, width, height), settings, draw)
+
     # -------------------------------------------------------------------------------------------------- viewport
 
     def view_update(self, context, depsgraph):
@@ -339,6 +386,17 @@ def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
             if frame.samples_done < frame.samples_to_draw:  # the picture is read next, which waits
                 limit.sample()
         yield
+
+
+def _pass_of(result, name: str):
+    return next(one for one in result.layers[0].passes if one.name == name)
+
+
+def _pixels(render_pass, height: int, width: int) -> np.ndarray:
+    """(H, W, channels) float32, bit by bit."""
+    found = np.empty(height * width * render_pass.channels, np.float32)
+    render_pass.rect.foreach_get(found)
+    return found.reshape(height, width, render_pass.channels)
 
 
 def _fill(result, name: str, eye: str, array: np.ndarray) -> None:

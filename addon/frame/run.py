@@ -402,6 +402,7 @@ class Renderer:
             tuple(one.links for one in snapshot.instances if one.links is not NO_LINKS),
             snapshot.own_values,
             snapshot.motion and snapshot.motion.key,
+            snapshot.baked,
         )  # fmt: skip
 
     def _clear_all_sums(self, frame: Frame) -> None:

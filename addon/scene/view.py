@@ -22,7 +22,7 @@ VIEW = Struct(
     ("vec4", "row_y"),
     ("vec4", "row_w"),
     ("vec4", "row_q"),
-    ("vec4", "eye"),  # xyz position relative to the render origin; w = 1 for orthographic
+    ("vec4", "eye"),  # xyz position relative to the render origin; w = 1 for orthographic, 2: see Camera.from_above
     ("vec4", "right"),  # w = jitter x, in pixels
     ("vec4", "up"),  # w = jitter y, in pixels
     ("vec4", "backward"),  # w = near distance of the depth buffer
@@ -109,9 +109,10 @@ class View:
             near = max(start, 3e-6 * scene_size)
         row_x = (2.0 * x - (left + right) * centre) / (right - left)
         row_y = (2.0 * y - (bottom + top) * centre) / (top - bottom)
+        seen = 2.0 if self.camera.from_above else float(orthographic)
         return {
             "row_x": row_x, "row_y": row_y, "row_w": w, "row_q": q,
-            "eye": (*eye.tolist(), float(orthographic)), "right": (*right_axis.tolist(), jitter[0]),
+            "eye": (*eye.tolist(), seen), "right": (*right_axis.tolist(), jitter[0]),
             "up": (*up.tolist(), jitter[1]), "backward": (*backward.tolist(), near), "frame": frame,
             "film": (width, height, start, end),
             "sample_index": sample, "seed": seed,

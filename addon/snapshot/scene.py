@@ -256,6 +256,7 @@ class Camera:
     name: str = ""
     aperture: Aperture | None = None  # None: all is in focus
     panorama: Panorama | None = None
+    from_above: bool = False  # each place of a surface is seen from above itself: of bakes alone
 
 
 @dataclass(frozen=True)
@@ -294,6 +295,19 @@ class Aov:
     def of_surface(self) -> bool:
         """Whether a layer that is too thin to be what passes of surfaces show has no part in it."""
         return self.kind in ("UV", "VECTOR", "HIT", "DISTANCE")
+
+
+@dataclass(frozen=True, eq=False)
+class BakedPoints:
+    """Places of one object that a picture shows instead of what a camera sees: of a bake, as Blender finds them."""
+
+    instance: str  # Instance.key
+    triangle: np.ndarray  # (H, W) int, row of the mesh's triangles; -1: none
+    share: np.ndarray  # (H, W, 2) float, weights of its second and third corner
+    step: np.ndarray  # (H, W, 2, 2) float, how they change a pixel to the right, and one up
+    plain: bool = False  # of the neutral material, whatever the object's own is
+    outward: bool = False  # facing away from the world's origin
+    through_camera: bool = False  # seen from the camera, not each from above
 
 
 CRYPTOMATTES = ("object", "material", "asset")
@@ -391,6 +405,7 @@ class Snapshot:
     moment: Moment = Moment()
     motion: Motion | None = None  # where the view layer asks for it
     volumes: tuple[VolumeInstance, ...] = ()
+    baked: BakedPoints | None = None
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
 
     @cached_property

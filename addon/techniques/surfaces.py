@@ -43,6 +43,7 @@ from ..lighting.visibility import traced_roughness
 from ..sampling.lens import rim
 from ..scene.receivers import TILE, Receivers, merged
 from ..scene.view import VIEW
+from ..surfaces.baked import BakedSurface
 from ..surfaces.draw import LEFT_OUT, MARKS, OPAQUE, STOCHASTIC, SURFACES, draw_sample, draw_surfaces, refracts
 
 DESCRIPTIONS = {  # the layout in full: shaders/lib/gbuffer.glsl
@@ -98,12 +99,12 @@ class Surfaces(Technique):
         else:
             frame.find_receivers = self._receivers(frame, self._target(frame), modes, known, key)
         if modes != (STOCHASTIC,) or known.key == key:  # else what was drawn for the receivers is the first sample
-            draw_sample(frame, self, self._target(frame))
+            self._draw(frame)
         self._drawn = True
 
     def sample(self, frame: Frame) -> None:
         if not self._drawn:
-            draw_sample(frame, self, self._target(frame))
+            self._draw(frame)
         self._drawn = False
         passes.fullscreen(
             MARK,
@@ -112,6 +113,12 @@ class Surfaces(Technique):
             constants={"traced_roughness": traced_roughness(frame)},
         )
         frame.count(self, "passes")
+
+    def _draw(self, frame: Frame) -> None:
+        if frame.snapshot.baked is not None:
+            frame.shared(BakedSurface).draw(frame, self, self._target(frame))
+        else:
+            draw_sample(frame, self, self._target(frame))
 
     @staticmethod
     def _target(frame: Frame) -> images.Target:
@@ -128,7 +135,10 @@ class Surfaces(Technique):
         for lens in (*(rim(aperture) if aperture else ()), (0.0, 0.0)):  # the middle last: it is the first sample
             frame.look(lens)
             for mode in modes:
-                draw_surfaces(frame, self, surfaces, mode, refracts(frame))
+                if frame.snapshot.baked is not None:
+                    frame.shared(BakedSurface).draw(frame, self, surfaces)
+                else:
+                    draw_surfaces(frame, self, surfaces, mode, refracts(frame))
                 target = images.Target(tuple(images.pool.take(*tiles, "RGBA32F") for _ in range(2)))
                 passes.fullscreen(
                     TILE_BOUNDS,
@@ -159,8 +169,9 @@ class _KnownReceivers:
 def _receivers_key(frame: Frame, modes: tuple[int, ...]) -> tuple:
     camera, settings = frame.snapshot.camera, frame.settings
     return (
-        frame.size, modes, camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-        camera.aperture, camera.panorama, frame.snapshot.film, settings.seed, settings.draft, refracts(frame),
+        frame.size, modes, frame.snapshot.baked, camera.matrix.tobytes(), camera.kind, camera.frame,
+        camera.clip_start, camera.clip_end, camera.aperture, camera.panorama, frame.snapshot.film, settings.seed,
+        settings.draft, refracts(frame),
         frame.geometry.changes, frame.geometry.origin.tobytes(), frame.materials.fingerprint(),
         tuple(sorted(settings.values.items())), tuple(technique.name for technique in frame.plan.techniques),
         frame.snapshot.own_values,

@@ -11,7 +11,7 @@ from ..frame import ledger as ledgers
 from ..frame.settings import AUTO
 from ..frame.technique import SCENE, identifier
 from ..techniques import REGISTRY
-from . import ENGINE, blender_panels, notes, pass_panels
+from . import ENGINE, bake_panel, blender_panels, notes, pass_panels
 from .passes import PASSES
 from .properties import titled
 from .quality import CANDELA_PT_quality_presets
@@ -583,6 +583,7 @@ _CLASSES = (
     CANDELA_RENDER_PT_frame_skipped,
     CANDELA_VIEWLAYER_PT_passes,
     *pass_panels.CLASSES,
+    *bake_panel.CLASSES,
     CANDELA_VIEWLAYER_PT_override,
     CANDELA_LIGHT_PT_beam_shape,
     CANDELA_LIGHT_PT_shadow,

@@ -118,6 +118,14 @@ def _slot_items(slot: str) -> list[tuple[str, str, str, int]]:
     return [*items, (OFF, "Off", "Leave this light out", OFF_NUMBER)]
 
 
+# Of Blender's bake operator.
+BAKE_TYPES = (
+    ("COMBINED", "Combined"), ("AO", "Ambient Occlusion"), ("SHADOW", "Shadow"), ("POSITION", "Position"),
+    ("NORMAL", "Normal"), ("UV", "UV"), ("ROUGHNESS", "Roughness"), ("EMIT", "Emit"), ("ENVIRONMENT", "Environment"),
+    ("DIFFUSE", "Diffuse"), ("GLOSSY", "Glossy"), ("TRANSMISSION", "Transmission"),
+)  # fmt: skip
+
+
 def slots() -> list[str]:
     """Names of all slots, in the registry's order."""
     return list(dict.fromkeys(slot for t in REGISTRY for slot in t.fills))
@@ -154,6 +162,10 @@ def _annotations() -> dict:
             items=(
                 ("10", "10 fps", "Finer pixels"), ("20", "20 fps", "Smoother"), ("30", "30 fps", "Smoothest"),
             ),
+        ),
+        "bake_type": bpy.props.EnumProperty(
+            name="Bake Type", default="COMBINED", description="What is baked of objects",
+            items=[(kind, label, "") for kind, label in BAKE_TYPES],
         ),
         "viewport_pause": bpy.props.BoolProperty(
             name="Pause Viewport", default=False, update=_redraw,

@@ -27,7 +27,7 @@ struct Seen {
 // weights alone would be far too bright.
 vec3 lobe_reflectance(Surface s)
 {
-  vec3 to_viewer = view_toward(s.position);
+  vec3 to_viewer = TO_VIEWER(s);
   float cosine = clamp(abs(dot(s.glossy_normal, to_viewer)), 0.0, 1.0);
   if (s.kind == FRESNEL_DIELECTRIC) {
     float least = dielectric_f0(s.glossy_ior);

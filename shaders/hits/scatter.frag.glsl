@@ -43,7 +43,7 @@ void main()
     return;
   }
 #else
-  vec3 viewer = view_toward(s.position);
+  vec3 viewer = TO_VIEWER(s);
   float width = view_pixel() * view_growth(s.position);
   vec3 throughput = vec3(1.0);
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;

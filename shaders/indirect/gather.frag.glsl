@@ -19,7 +19,7 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
-  vec3 to_viewer = view_toward(s.position);
+  vec3 to_viewer = TO_VIEWER(s);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 7);
   bool scatters = max_component(s.diffuse) > 0.0;

@@ -33,7 +33,7 @@ Probe probe_read(int index)
   probe.geometric_normal = s.geometric_normal;
   bool glass = s.kind == LOBE_REFRACTION;
   if (probe.receives && (glass || (s.kind <= FRESNEL_F82 && s.glossy_roughness < WIDE_LOBE && is_metal(s.diffuse, s.glossy_weight * s.glossy_tint)))) {
-    vec3 onward = -view_toward(s.position);
+    vec3 onward = -TO_VIEWER(s);
     uint salt = bits.z + uint(film_view.sample_index);
     vec3 beside = s.geometric_normal;
     if (glass) {

@@ -58,6 +58,9 @@ struct Surface {
 #define SURFACE_READ(pixel) SURFACE_DECODED(pixel)
 #endif
 
+// Towards whom sees a surface: where eye.w of the view is 2, as for a bake, each place is seen from above itself.
+#define TO_VIEWER(s) ((film_view.eye.w > 1.5) ? s.normal : view_toward(s.position))
+
 // Alpha squared of microfacets that deviate from the normal as the bumped one does.
 float bump_squared(vec3 normal, vec3 bumped)
 {

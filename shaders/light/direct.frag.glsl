@@ -64,7 +64,7 @@ void main()
     return;
   }
   Surface s = surface_mirrored(SURFACE_READ(pixel));
-  vec3 to_viewer = view_toward(s.position);
+  vec3 to_viewer = TO_VIEWER(s);
   GrassSeen grass = grass_see(pixel, s);
   bool has_diffuse = max_component(s.diffuse) > 0.0;
   bool has_glossy = s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;

@@ -134,7 +134,7 @@ void main()
   if (s.kind != LOBE_REFRACTION) {
     return;
   }
-  vec3 to_viewer = view_toward(s.position);
+  vec3 to_viewer = TO_VIEWER(s);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 53u));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 13);
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));

@@ -63,7 +63,7 @@ void main()
   if (s.glossy_roughness > traced_roughness || s.kind > FRESNEL_F82) {
     return;
   }
-  vec3 to_viewer = view_toward(s.position);
+  vec3 to_viewer = TO_VIEWER(s);
   Lobe lobe = lobe_begin(s, to_viewer);
   bool mirror = lobe_is_mirror(lobe);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u));

@@ -19,7 +19,7 @@ void main()
   if (s.kind > FRESNEL_F82 || max_component(s.glossy_weight) <= 0.0) {
     return;
   }
-  vec3 to_viewer = view_toward(s.position);
+  vec3 to_viewer = TO_VIEWER(s);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 37u));
   vec3 own = fract(buffer_choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
   MicroFrame f = micro_frame(s.position, s.geometric_normal, s.geometric_normal, own);

@@ -82,7 +82,7 @@ void main()
 #ifdef RAYS
   if (open_sectors > 0.0 && dot(chosen, s.geometric_normal) > 0.0) {
     vec3 found = path_radiance(ray_origin(s.position, s.geometric_normal), chosen, hash3(roll));
-    vec3 weight = diffuse_weight(s, view_toward(s.position), chosen);
+    vec3 weight = diffuse_weight(s, TO_VIEWER(s), chosen);
     out_arriving.rgb += found * weight * (open_sectors / (32.0 * float(fan_count)));
   }
 #endif

@@ -10,7 +10,7 @@ void main()
   if (!diffuse_surface(pixel, s)) {
     return;
   }
-  vec3 viewer = view_toward(s.position);
+  vec3 viewer = TO_VIEWER(s);
   vec3 u = vec3(tile_numbers(pixel, film_view.bits_x, film_view.bits_y),
                 tile_numbers(pixel, film_view.bits_z, film_view.bits_w).x);
   int points = fan_count * step_count;

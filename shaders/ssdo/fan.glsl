@@ -120,7 +120,7 @@ vec3 film_ray(vec2 place, out vec3 origin)
 bool fan_begin(Surface s, vec2 place, vec3 direction, float rounding, out Fan fan)
 {
   fan.origin = s.position;
-  fan.toward = view_toward(s.position);
+  fan.toward = TO_VIEWER(s);
   vec3 bitangent;
   vec3 across = direction - dot(direction, fan.toward) * fan.toward;
   if (dot(across, across) > 1e-10) {

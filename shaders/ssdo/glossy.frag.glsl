@@ -14,7 +14,7 @@ void main()
   }
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 57u));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 29);
-  Lobe lobe = lobe_begin(s, view_toward(s.position));
+  Lobe lobe = lobe_begin(s, TO_VIEWER(s));
   vec3 weight;
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   vec3 direction = lobe_sample(lobe, u, weight);

@@ -12,7 +12,7 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
-  vec3 viewer = view_toward(s.position);
+  vec3 viewer = TO_VIEWER(s);
   vec3 whole = surface_albedo(s, max(dot(s.geometric_normal, viewer), 0.0));
 #ifdef FROM_LIGHT
   // What this sample found. Glossy reflection is added as even.

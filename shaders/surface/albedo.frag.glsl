@@ -11,7 +11,7 @@ void main()
   out_albedo = vec4(0.0);
   if (out_position.w != 0.0) {
     Surface s = SURFACE_READ(pixel);
-    vec3 to_viewer = view_toward(s.position);
+    vec3 to_viewer = TO_VIEWER(s);
     out_albedo.rgb = surface_albedo(s, max(dot(s.geometric_normal, to_viewer), 0.0));
   }
 }
