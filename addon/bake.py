@@ -37,6 +37,8 @@ ORDERS = {"direct": DIRECT, "indirect": INDIRECT}
 SIZE = 1e-3  # of the film's filter, pixels: each texel is by itself
 DATA_SAMPLES = 4  # at most, of what is no light
 PARAMS = {("film", "points"): 1}
+GLASS = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
+SUBSURFACE = "ShaderNodeSubsurfaceScattering"
 MIRROR = Graph(
     {
         "mirror": Node(
@@ -68,6 +70,25 @@ def rows_of(mesh: Mesh, corners: np.ndarray) -> np.ndarray:
     return np.array([known.get(tuple(three), -1) for three in corners.tolist()], np.int64)
 
 
+def left_out(instance: Instance, snapshot: Snapshot) -> list[str]:
+    """Sentences about what a bake of an object does not show as a picture does."""
+    found = []
+    for material in {snapshot.materials[slot].name: snapshot.materials[slot] for slot in instance.materials}.values():
+        nodes = material.graph.nodes.values()
+        if any(node.type in GLASS or _weighs(node, "Transmission Weight") for node in nodes):
+            found.append(f"Material '{material.name}': what glass shows is too bright in a bake.")
+        if any(node.type == SUBSURFACE or _weighs(node, "Subsurface Weight") for node in nodes):
+            found.append(f"Material '{material.name}': light below the surface leaves where it entered, in a bake.")
+    if snapshot.world.medium is not None or snapshot.volumes:
+        found.append("Fog is left out of bakes.")
+    return found
+
+
+def _weighs(node: Node, name: str) -> bool:
+    socket = node.inputs.get(name)
+    return socket is not None and (socket.link is not None or bool(socket.value))
+
+
 def seen_from_above(instance: Instance, mesh: Mesh, width: int, height: int) -> Camera:
     """A camera that has the object before it; of what it sees only the direction of view counts, which it has from each
     place."""
@@ -95,10 +116,17 @@ def prepared(snapshot: Snapshot, points: BakedPoints, width: int, height: int) -
     )  # fmt: skip
     world = replace(snapshot.world, medium=None, volume=None)  # what would lie between a surface and its viewer
     return replace(
-        snapshot, camera=replace(camera, aperture=None), film=film, baked=points, motion=None, world=world, volumes=()
+        snapshot,
+        camera=replace(camera, aperture=None, bends=points.through_camera),
+        film=film,
+        baked=points,
+        motion=None,
+        world=world,
+        volumes=(),
     )
 
 
+LIT = ("COMBINED", "DIFFUSE", "GLOSSY", "TRANSMISSION")
 BY_MESH = ("POSITION", "UV")  # what the mesh says without its materials
 
 

@@ -345,6 +345,8 @@ class CandelaEngine(bpy.types.RenderEngine):
         settings = settings_of(scene, viewport=False, layer=depsgraph.view_layer, depsgraph=depsgraph)
         parts = _whole_samples if bpy.app.background else samples_in_parts
         draw = bake.drawing(shared.renderer, parts, main_loop.taken, self.test_break)
+        for sentence in bake.left_out(instance, snapshot) if kind in bake.LIT else ():
+            self.report({"WARNING"}, sentence)
         self.update_stats("Candela", f"Baking {thing.name}")
         return bake.baked(kind, what, bake.prepared(snapshot, points, width, height), settings, draw)
 

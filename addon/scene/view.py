@@ -22,7 +22,7 @@ VIEW = Struct(
     ("vec4", "row_y"),
     ("vec4", "row_w"),
     ("vec4", "row_q"),
-    ("vec4", "eye"),  # xyz position relative to the render origin; w = 1 for orthographic, 2: see Camera.from_above
+    ("vec4", "eye"),  # xyz position relative to the render origin; w: TO_VIEWER of shaders/lib/gbuffer.glsl
     ("vec4", "right"),  # w = jitter x, in pixels
     ("vec4", "up"),  # w = jitter y, in pixels
     ("vec4", "backward"),  # w = near distance of the depth buffer
@@ -110,6 +110,8 @@ class View:
         row_x = (2.0 * x - (left + right) * centre) / (right - left)
         row_y = (2.0 * y - (bottom + top) * centre) / (top - bottom)
         seen = 2.0 if self.camera.from_above else float(orthographic)
+        if self.camera.bends:
+            seen = 1.25 if orthographic else -1.0
         return {
             "row_x": row_x, "row_y": row_y, "row_w": w, "row_q": q,
             "eye": (*eye.tolist(), seen), "right": (*right_axis.tolist(), jitter[0]),

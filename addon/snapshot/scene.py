@@ -256,7 +256,8 @@ class Camera:
     name: str = ""
     aperture: Aperture | None = None  # None: all is in focus
     panorama: Panorama | None = None
-    from_above: bool = False  # each place of a surface is seen from above itself: of bakes alone
+    from_above: bool = False  # each place of a surface is seen from above itself: of bakes alone, as the next one
+    bends: bool = False  # what faces away is seen, too
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from ..snapshot.scene import BakedPoints, Instance, Mesh
 from .hits import Hits, Records
 
 NEUTRAL = 0  # of Snapshot.materials
+BENT_OFFSET = 0.2  # as of Cycles and shaders/lib/gbuffer.glsl
 
 
 class BakedSurface:
@@ -95,6 +96,7 @@ def _columns(
         direction = _unit(position - (camera.matrix[:3, 3] - frame.geometry.origin))
         if camera.kind == "ORTHOGRAPHIC":
             direction = np.broadcast_to(-camera.matrix[:3, 2], position.shape)
+        direction = -_bent(-direction, shading)
     else:
         direction = -shading
 
@@ -110,6 +112,13 @@ def _columns(
         column(octahedral(plane), octahedral(shading)), column(material, one, none, none),
     ]  # fmt: skip
     return columns, set(np.unique(material).tolist()), column(direction, none)
+
+
+def _bent(toward: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Directions to a viewer that sees what faces away, too: viewer_of of shaders/lib/gbuffer.glsl."""
+    above = (toward * normal).sum(axis=1, keepdims=True)
+    raised = _unit(toward - normal * np.minimum(above - BENT_OFFSET, 0.0))
+    return np.where(above <= 0.0, _unit(raised + (normal - raised) * -above), raised)
 
 
 def _inside(share: np.ndarray) -> np.ndarray:

@@ -120,9 +120,18 @@ def _slot_items(slot: str) -> list[tuple[str, str, str, int]]:
 
 # Of Blender's bake operator.
 BAKE_TYPES = (
-    ("COMBINED", "Combined"), ("AO", "Ambient Occlusion"), ("SHADOW", "Shadow"), ("POSITION", "Position"),
-    ("NORMAL", "Normal"), ("UV", "UV"), ("ROUGHNESS", "Roughness"), ("EMIT", "Emit"), ("ENVIRONMENT", "Environment"),
-    ("DIFFUSE", "Diffuse"), ("GLOSSY", "Glossy"), ("TRANSMISSION", "Transmission"),
+    ("COMBINED", "Combined", "Light of all kinds that are chosen below"),
+    ("AO", "Ambient Occlusion", "How open places are to the sky"),
+    ("SHADOW", "Shadow", "Share of the lamps' light that arrives"),
+    ("POSITION", "Position", "Places in the world"),
+    ("NORMAL", "Normal", "Normals, with bumps"),
+    ("UV", "UV", "Places in the map that renders"),
+    ("ROUGHNESS", "Roughness", "Roughness of gloss"),
+    ("EMIT", "Emit", "What surfaces emit"),
+    ("ENVIRONMENT", "Environment", "The world, in the direction of a place from the origin"),
+    ("DIFFUSE", "Diffuse", "Light of diffuse surfaces, or their colour"),
+    ("GLOSSY", "Glossy", "Light that is mirrored, or its colour"),
+    ("TRANSMISSION", "Transmission", "Light that shines through, or its colour"),
 )  # fmt: skip
 
 
@@ -164,8 +173,8 @@ def _annotations() -> dict:
             ),
         ),
         "bake_type": bpy.props.EnumProperty(
-            name="Bake Type", default="COMBINED", description="What is baked of objects",
-            items=[(kind, label, "") for kind, label in BAKE_TYPES],
+            name="Bake Type", default="COMBINED", description="What is baked of objects", update=_redraw,
+            items=BAKE_TYPES,
         ),
         "viewport_pause": bpy.props.BoolProperty(
             name="Pause Viewport", default=False, update=_redraw,
