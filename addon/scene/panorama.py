@@ -74,6 +74,7 @@ def tiles_of(view: View) -> list[Tile]:
     columns, rows = min(x1 - x0, 512), min(y1 - y0, 512)
     u = np.linspace(x0 - MARGIN, x1 + MARGIN, columns + 1) / view.film.width
     v = np.linspace(y0 - MARGIN, y1 + MARGIN, rows + 1) / view.film.height
+    u, v = camera.panorama.film(u, v)
     seen = camera.panorama.directions(u, v[:, None])
     there = np.abs(seen).sum(axis=-1) > 0.0
     if camera.panorama.stereo is not None:

@@ -132,7 +132,8 @@ class View:
         stereo = panorama.stereo
         if panorama.projection == "FISHEYE_LENS_POLYNOMIAL":
             values = (values[0], values[4], values[2], values[3], *values[5:])
-        width, height = self.film.width, self.film.height
+        left, bottom = panorama.film(self.film.border[0] / self.film.width, self.film.border[1] / self.film.height)
+        right, top = panorama.film(1.0 / self.film.width, 1.0 / self.film.height)
         return {
             "panorama": values[:4], "panorama_more": values[4:8],
             "panorama_eye": (*lens, focus, float(PROJECTIONS[panorama.projection])),
@@ -140,7 +141,7 @@ class View:
                 stereo.offset, stereo.convergence if np.isfinite(stereo.convergence) else 0.0,
                 stereo.merge_from, stereo.merge_to,
             ),
-            "panorama_film": (self.film.border[0] / width, self.film.border[1] / height, 1 / width, 1 / height),
+            "panorama_film": (left, bottom, right - panorama.window[0], top - panorama.window[1]),
         }  # fmt: skip
 
     def _looking(self, lens: tuple[float, float]) -> tuple:

@@ -6,6 +6,8 @@ float32 matrix loses it when the clip distances are extreme (1e-9 to 1e12), so i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .errors import UnsupportedScene
@@ -106,6 +108,32 @@ def _frame(
     middle_x, middle_y = shift * span, data.shift_y * span
     half_x, half_y = 0.5 * width * per_pixel, 0.5 * height * pixel_height * per_pixel
     return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
+
+
+def framed(scene, depsgraph, camera) -> tuple[float, float, float, float]:
+    """Left, right, bottom, top of the picture that a camera renders, one unit before the eye, in a viewport that looks
+    through it: panoramic ones are shown as perspective."""
+    render, data = scene.render, camera.evaluated_get(depsgraph).data
+    aspect = render.pixel_aspect_x, render.pixel_aspect_y
+    return _frame(data, render.resolution_x, render.resolution_y, aspect, data.shift_x)
+
+
+def panoramic_view(view: Camera, scene, depsgraph, camera, size: tuple[int, int]) -> Camera:
+    """A viewport's perspective `view` through a panoramic camera as the panorama, which fills the camera's frame."""
+    render, camera = scene.render, camera.evaluated_get(depsgraph)
+    left, right, bottom, top = framed(scene, depsgraph, camera)
+    window = (
+        (view.frame[0] - left) / (right - left), (view.frame[2] - bottom) / (top - bottom),
+        (view.frame[1] - left) / (right - left), (view.frame[3] - bottom) / (top - bottom),
+    )  # fmt: skip
+    width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
+    seen = _panoramic(camera, np.array(camera.matrix_world, np.float64), width, height, "")
+    # As many pixels as the frame has in the region show the film.
+    scale = np.array(size) * mean_angle(
+        seen.panorama, size[0] / (window[2] - window[0]), size[1] / (window[3] - window[1])
+    )
+    frame = (-0.5 * scale[0], 0.5 * scale[0], -0.5 * scale[1], 0.5 * scale[1])
+    return replace(seen, frame=frame, name="", panorama=replace(seen.panorama, window=window))
 
 
 def _panoramic(camera, placed: np.ndarray, width: float, height: float, eye: str) -> Camera:

@@ -45,11 +45,19 @@ class Panorama:
     FISHEYE_EQUISOLID    field of view, focal length, width and height of the sensor, mm
     FISHEYE_LENS_POLYNOMIAL  the same with 0 for the focal length, then five coefficients
     CENTRAL_CYLINDRICAL  longitude from, to, height from, to at a distance of 1
+
+    `window`: left, bottom, right and top of what the picture shows of the film; a viewport also shows what lies beyond.
     """
 
     projection: str
     values: tuple[float, ...] = ()
     stereo: Stereo | None = None
+    window: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
+
+    def film(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places of the film from shares of the picture's width and height."""
+        left, bottom, right, top = self.window
+        return left + (right - left) * u, bottom + (top - bottom) * v
 
     def directions(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """(..., 3) of places of the film; 0 where it sees nothing."""

@@ -23,7 +23,8 @@ import numpy as np
 from ..gfx import context as gpu_context
 from ..gfx import images
 from ..gfx.context import turn
-from ..snapshot import UnsupportedScene, camera_of_scene, camera_of_view, take
+from ..snapshot import UnsupportedScene, camera_of_view, take
+from ..snapshot.camera import framed, panoramic_view
 from ..snapshot.errors import unforeseen
 from ..snapshot.scene import Camera, Snapshot
 from ..ui.properties import settings_of
@@ -131,6 +132,8 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         border = render_border(depsgraph, space, camera, looks_through, size)
         viewport.step = STEP_SHARE / float(depsgraph.scene.candela.navigation)
         viewport.coarsest = coarsest_for(framed_height(depsgraph, camera, looks_through, size))
+        if looks_through is not None and looks_through.data.type == "PANO":
+            camera = panoramic_view(camera, depsgraph.scene_eval, depsgraph, looks_through, size)
         viewport.draw_frame(
             source, camera, size, settings_of(depsgraph.scene, viewport=True, depsgraph=depsgraph), border=border
         )
@@ -161,8 +164,7 @@ def render_border(depsgraph, space, view: Camera, looks_through, size: tuple[int
     render = depsgraph.scene_eval.render
     if looks_through is not None and render.use_border:
         # Both frames lie one unit before the same eye, so they can be compared.
-        resolution = render.resolution_x, render.resolution_y
-        left, right, bottom, top = camera_of_scene(depsgraph.scene_eval, depsgraph, *resolution, looks_through).frame
+        left, right, bottom, top = framed(depsgraph.scene_eval, depsgraph, looks_through)
         low = left + (right - left) * render.border_min_x, bottom + (top - bottom) * render.border_min_y
         high = left + (right - left) * render.border_max_x, bottom + (top - bottom) * render.border_max_y
         left, right, bottom, top = view.frame
@@ -183,9 +185,7 @@ def framed_height(depsgraph, view: Camera, looks_through, size: tuple[int, int])
     """Pixels of the camera's frame from top to bottom; of a view of its own those of the region."""
     if looks_through is None:
         return float(size[1])
-    render = depsgraph.scene_eval.render
-    resolution = render.resolution_x, render.resolution_y
-    _, _, bottom, top = camera_of_scene(depsgraph.scene_eval, depsgraph, *resolution, looks_through).frame
+    _, _, bottom, top = framed(depsgraph.scene_eval, depsgraph, looks_through)
     return size[1] * (top - bottom) / (view.frame[3] - view.frame[2])
 
 

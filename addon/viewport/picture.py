@@ -273,6 +273,8 @@ class Viewport:
         """If the picture of this view is still to come, and what is shown is of another one: a first look at it."""
         pending = self._beginning is not None or not (self.frame.samples_done or self._waits)
         place = _view_key(camera), size, border
+        if camera.panorama is not None:  # the look is drawn by straight lines
+            return
         if not pending or (self._target is not None and self._shown_place == place and not self.looks):
             return
         if self._beginning is not None and not self._beginning.placed:

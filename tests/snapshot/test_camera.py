@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mathutils import Euler, Matrix, Vector
 
 from addon.snapshot import UnsupportedScene, camera_of_scene, camera_of_view
+from addon.snapshot.camera import panoramic_view
 from addon.snapshot.scene import Aperture
 
 
@@ -99,6 +100,20 @@ def test_the_projection_of_a_panoramic_camera_is_read(stage):
     assert camera.panorama.values == pytest.approx((3.0, 8.0, 30.0, 22.5))
     lens.panorama_type, lens.longitude_min, lens.latitude_max = "EQUIRECTANGULAR", -1.0, 0.5
     assert made(stage, 64, 48).panorama.values == pytest.approx((-1.0, np.pi, -np.pi / 2, 0.5))
+
+
+def test_a_viewport_shows_the_panorama_in_the_cameras_frame(stage):
+    """Here the region is the frame, and then one of twice its size."""
+    placed, depsgraph = stage.camera("Dome"), bpy.context.evaluated_depsgraph_get()
+    window = placed.calc_matrix_camera(depsgraph, x=stage.scene.render.resolution_x, y=stage.scene.render.resolution_y)
+    placed.data.type, placed.data.panorama_type = "PANO", "EQUIRECTANGULAR"
+    for scale, expected in ((1.0, (0.0, 0.0, 1.0, 1.0)), (0.5, (-0.5, -0.5, 1.5, 1.5))):
+        seen = camera_of_view(
+            view_of(placed.matrix_world.inverted(), Matrix.Diagonal((scale, scale, 1, 1)) @ window, True)
+        )
+        shown = panoramic_view(seen, stage.scene, bpy.context.evaluated_depsgraph_get(), placed, (64, 36))
+        assert shown.panorama.window == pytest.approx(expected, abs=1e-5)
+        assert shown.frame[1] - shown.frame[0] == pytest.approx(np.pi * 2**0.25 * 4 / 3 / scale, rel=0.03)
 
 
 def test_lenses_that_are_programs_are_refused_with_a_sentence(stage):
