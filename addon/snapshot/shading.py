@@ -7,6 +7,7 @@ from dataclasses import replace
 import bpy
 
 from ..materials.attributes import attributes_of
+from ..materials.culling import culled
 from ..materials.graph import Graph, Input, Node
 from ..materials.ies import Profile
 from ..materials.nodes.inputs import FLAT
@@ -70,6 +71,11 @@ class ShadingTable:
         self.notes: list[Note] = []
         self.graphs: set[str] = set()
         self._cache, self._images, self._aovs, self._layer = cache, images, aovs, layer
+        own = None if layer is None else getattr(layer[0], "candela", None)
+        self._culls = bool(own is not None and own.use_backface_culling)
+        if cache.culls != self._culls:
+            cache.graphs.clear()
+            cache.culls = self._culls
         uv = tuple((aov.name, aov.kind, Input("VECTOR")) for aov in aovs if aov.of_surface)
         self.materials[0] = replace(self.materials[0], graph=replace(self.materials[0].graph, aovs=uv))
         self._index: dict[int, int] = {}
@@ -132,6 +138,8 @@ class ShadingTable:
         graph, remarks = read_graph(block, image_key, tuple((aov.name, aov.kind) for aov in self._aovs))
         if isinstance(block, bpy.types.Material):
             named = ((name, bpy.data.images.get(image)) for name, image in names_of(own_settings(block)).items())
+            if self._culls:
+                graph = culled(graph, block.use_backface_culling, block.use_backface_culling_shadow)
             graph = with_maps(graph, {name: image_key(image, None) for name, image in named if image is not None})
         graph = self._with_sources(graph, isinstance(block, bpy.types.Material))
         if old is not None and old.graph == graph:

@@ -449,6 +449,11 @@ class CANDELA_MATERIAL_PT_settings(_CandelaPanel, bpy.types.Panel):
         column = _columns(self)
         column.prop(context.material, "pass_index")
         column.prop(context.material, "use_transparent_shadow", text="Transparent Shadows")
+        column.prop(context.scene.candela, "use_backface_culling", text="Cull Back Faces")
+        part = column.column(heading="Backface Culling")
+        part.active = context.scene.candela.use_backface_culling
+        part.prop(context.material, "use_backface_culling", text="Camera")
+        part.prop(context.material, "use_backface_culling_shadow", text="Shadow")
 
 
 class CANDELA_OBJECT_PT_shadow_terminator(_CandelaPanel, bpy.types.Panel):

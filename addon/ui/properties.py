@@ -172,6 +172,11 @@ def _annotations() -> dict:
                 ("10", "10 fps", "Finer pixels"), ("20", "20 fps", "Smoother"), ("30", "30 fps", "Smoothest"),
             ),
         ),
+        "use_backface_culling": bpy.props.BoolProperty(
+            name="Backface Culling", default=False, update=_redraw,
+            description="Leave out back faces of materials that EEVEE would leave out, for the camera and for shadows. "
+            "Cycles draws them",
+        ),
         "bake_type": bpy.props.EnumProperty(
             name="Bake Type", default="COMBINED", description="What is baked of objects", update=_redraw,
             items=BAKE_TYPES,
