@@ -36,9 +36,9 @@ from .linked import linked_at_hits
 from .media import dimmed
 from .walked_light import FEW_WALKS
 
-LEAST_WALKS = 2  # of a point in a sample
+LEAST_WALKS = 4  # of a point in a sample
 WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 4, images.LIST_WIDTH
-LEFT = ("sent", "part", "same")
+LEFT = ("sent", "slope", "part", "same")
 LEAVING = passes.fullscreen_program(
     "light that leaves points",
     "subsurface/leaving.frag.glsl",
@@ -47,18 +47,22 @@ LEAVING = passes.fullscreen_program(
         ("RG32F", "trace_owners"),
         *(("RGBA32F", name) for name in (
             "point_position", "point_normal", "point_instances", "cell_direct", "cell_shapes", "scatter_objects",
-            "scatter_near", "scatter_means", "walk_lobes", "surface_position",
+            "scatter_near", "scatter_means", "walk_lobes", "surface_position", "slope_before",
         )),
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size")),
+    constants=(
+        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size"), ("FLOAT", "newest"),
+    ),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
     outputs=tuple(("VEC4", f"out_{name}") for name in LEFT),
 )  # fmt: skip
 LIST = passes.fullscreen_program(
     "list of light that leaves points",
     "subsurface/leaving_list.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in (*(f"cell_{name}" for name in LEFT), "point_position")),
+    textures=tuple(
+        ("RGBA32F", name) for name in (*(f"cell_{name}" for name in LEFT), "point_position", "point_normal")
+    ),
     outputs=(("VEC4", "out_texel"),),
 )
 PROGRAMS = (LEAVING, LIST)
@@ -103,6 +107,12 @@ class LeavingLight:
     def __init__(self):
         self.image: images.Image | None = None
         self._rows = 0  # of the image, that points take
+        self._slope: images.Image | None = None  # mean over the samples so far
+        self._samples = 0
+
+    def begin(self) -> None:
+        """A picture begins."""
+        self._samples = 0
 
     def update(self, points: ScatterPoints, walked: Any) -> None:
         """Lay out the list for these points. `walked`: numbers of the materials whose light is walked."""
@@ -128,20 +138,36 @@ class LeavingLight:
                 **hierarchy.textures, **textures, "trace_owners": owners, "point_position": position,
                 "point_normal": normal, "point_instances": points.instances, "scatter_objects": points.table,
                 "scatter_near": points.near, "surface_position": frame.images["surface.position"],
+                "slope_before": self._slope if self._samples else position,
             },
             blocks={"film_view": frame.view_block},
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
+                "newest": 1.0 / (self._samples + 1),
                 "walks": 1 if frame.settings.draft else max(FEW_WALKS // frame.settings.samples, LEAST_WALKS),
             },
         )  # fmt: skip
         passes.fullscreen(
             LIST, images.Target((self.image,)), viewport=(0, 1, WIDTH, self._rows),
-            textures={**{f"cell_{name}": image for name, image in zip(LEFT, left)}, "point_position": position},
+            textures={
+                **{f"cell_{name}": image for name, image in zip(LEFT, left)}, "point_position": position,
+                "point_normal": normal,
+            },
         )  # fmt: skip
-        for image in left:
-            images.pool.give(image)
+        self._give()
+        self._samples += 1
+        for name, image in zip(LEFT, left):
+            if name == "slope":
+                self._slope = image
+            else:
+                images.pool.give(image)
+
+    def _give(self) -> None:
+        if self._slope is not None:
+            images.pool.give(self._slope)
+        self._slope = None
 
     def release(self) -> None:
         """Drop GPU resources."""
+        self._give()
         self.__init__()

@@ -206,6 +206,7 @@ class ImageSpaceSubsurface(Technique):
         self._whole[0].clear()
         self._light.begin(frame)
         self._leaving_sample, self._direct = -1, None
+        self._leaving.begin()
         walked = [k for k in self._materials if may_walk(frame.snapshot.materials[k].graph)]
         if walked and self.points.rows:
             frame.kept(ScatterMeans).update(frame, walked)

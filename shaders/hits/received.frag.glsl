@@ -159,7 +159,7 @@ void main()
   vec3 sent;
   vec3 part;
   vec3 same;
-  bool leaves = light_leaves(-1, r.surface.position, r.surface.geometric_normal, roll.y, sent, part, same);
+  bool leaves = light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, roll.y, sent, part, same);
   vec3 straight = leaves ? diffuse * (vec3(1.0) - part) : diffuse;
   vec3 onward = leaves ? diffuse * (vec3(1.0) - part * (vec3(1.0) - same)) : diffuse;
   vec3 sum = leaves ? float(repeats) * diffuse * part * sent : vec3(0.0);

@@ -154,7 +154,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   vec3 same;
   met.leaving = vec3(0.0);
   met.straight = vec3(1.0);
-  if (light_leaves(triangle_material(hit), met.position, met.normal, salt, met.leaving, part, same)) {
+  if (light_leaves(triangle_material(hit), met.position, met.normal, -direction, salt, met.leaving, part, same)) {
     vec3 onward = vec3(1.0) - part * (vec3(1.0) - same);
     met.leaving *= part * met.reflection.diffuse;
     met.straight = (vec3(1.0) - part) / max(onward, vec3(1e-6));

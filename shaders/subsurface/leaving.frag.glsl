@@ -1,7 +1,8 @@
 // What light below the surface leaves objects at their points, for whoever sees them but the camera (lighting/leaving_light.py): by
 // walks from each point, entered from directions of the cosine's density. For albedo 1:
 //
-//   sent  radiance, of the direct light of points
+//   sent  radiance, of the direct light of points, mean over directions
+//   slope by how much more the normal's direction gets than the surface's: the line fitted to the walks by the cosine
 //   part  share of the diffuse albedo that scatters and that walks find; the rest is as a diffuse surface
 //   same  of light that arrives evenly at the side on which the point lies, how much leaves there again
 #include "lib/gbuffer.glsl"
@@ -37,6 +38,7 @@ void main()
   out_sent = vec4(0.0);
   out_part = vec4(0.0);
   out_same = vec4(0.0);
+  out_slope = vec4(0.0);
   vec4 place = point_position_fetch(texel);
   vec4 belongs = point_instances_fetch(texel);
   int material = int(belongs.w + 0.5);
@@ -79,19 +81,25 @@ void main()
   even.polar = salt4.xy;
   even.azimuth = salt5.xy;
   vec3 rest = vec3(0.0);
+  vec3 by_cosine = vec3(0.0);
   for (int walk = 0; walk < walks; walk++) {
     even.index = (film_view.sample_index * walks + walk) * 16 + (texel.x & 3) + 4 * (texel.y & 3);
     vec2 u = vec2(shuffled(even.index, salt1.xy), shuffled(even.index, salt2.xy));
     vec2 v = vec2(shuffled(even.index, salt6.xy), shuffled(even.index, salt7.xy));
     vec3 view = cosine_direction(entered_normal, v);
     vec3 direction = entry_direction(entered_normal, view, color.w, share.w, method == SCATTER_SKIN, u);
+    vec3 before = sent_so_far;
     if (dot(direction, face) < 0.0) {
       rest += walk_below(below, start, direction, even, roll);
     }
+    by_cosine += (dot(view, entered_normal) - 2.0 / 3.0) * (sent_so_far - before);
   }
   rest *= walk_rest(color.rgb);
   vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / (max(color.rgb, vec3(1e-3)) * float(walks));
   out_sent = vec4(sent_so_far * norm, 0.0);
+  // One over the variance of the cosine; its noise is larger than what it adds: a mean over the samples so far.
+  vec3 slope = 18.0 * by_cosine * norm;
+  out_slope = vec4((newest < 1.0) ? mix(slope_before_fetch(texel).rgb, slope, newest) : slope, 0.0);
   out_part = vec4(part * share.rgb, 0.0);
   out_same = vec4(same_so_far * norm, 0.0);
 }

@@ -1,7 +1,8 @@
 // What light below their surfaces leaves objects where rays meet them, in place of what a diffuse surface would send: of the nearest
 // point of an object that scatters (lighting/leaving_light.py). `leaving_light` is a list, 2048 to a row: where instances begin,
 // how many there are, where voxels begin; from the next texel on which materials scatter, four to a texel; from the next row on
-// four texels a point (subsurface/leaving.frag.glsl, and its place); instances, two each; voxels, two each (scatter_points.py).
+// four texels a point (subsurface/leaving_list.frag.glsl); instances, two each; voxels, two each (scatter_points.py).
+#define MEAN_COSINE_SENT (2.0 / 3.0)
 #define LEAVING_SPREAD 0.9  // voxels, over which what points send is spread
 
 vec4 leaving_texel(int index)
@@ -9,10 +10,11 @@ vec4 leaving_texel(int index)
   return leaving_light_fetch(ivec2(index & 2047, index >> 11));
 }
 
-// Light at `position` of a surface that faces along `normal`; material -1: of any. For albedo 1: `sent`, the radiance that leaves of
-// direct light; `part`, the share of the diffuse albedo that this takes the place of; `same`, by how much of its albedo that part
+// Light at `position` of a surface that faces along `normal`; material -1: of any. For albedo 1: `sent`, the radiance that leaves
+// towards the viewer of direct light; `part`, the share of the diffuse albedo that this takes the place of; `same`, by how much of its albedo that part
 // sends back light that arrives evenly on this side. False where nothing scatters.
-bool light_leaves(int material, vec3 position, vec3 normal, uint salt, out vec3 sent, out vec3 part, out vec3 same)
+bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint salt, out vec3 sent, out vec3 part,
+                  out vec3 same)
 {
   sent = part = same = vec3(0.0);
   if (material >= 0 && leaving_texel(1 + (material >> 2))[material & 3] == 0.0) {
@@ -53,8 +55,11 @@ bool light_leaves(int material, vec3 position, vec3 normal, uint salt, out vec3 
     return false;
   }
   int first = 2048 + 4 * chosen;
-  part = leaving_texel(first + 1).xyz;
-  sent = leaving_texel(first).xyz;
-  same = leaving_texel(first + 2).xyz;
+  vec4 mean = leaving_texel(first);
+  vec4 parts = leaving_texel(first + 1);
+  vec4 slope = leaving_texel(first + 2);
+  part = parts.xyz;
+  sent = max(mean.xyz + slope.xyz * (dot(normal, to_viewer) - MEAN_COSINE_SENT), vec3(0.0));
+  same = vec3(mean.w, parts.w, slope.w);
   return max_component(part) > 0.0;
 }

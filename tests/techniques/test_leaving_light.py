@@ -1,0 +1,38 @@
+"""Light that leaves wax and skin goes on: to the floor, into mirrors, to other bodies."""
+
+import numpy as np
+import pytest
+
+from tests.techniques.test_image_space_subsurface import scattering, shown, sphere
+
+
+def test_light_that_comes_through_a_slab_reaches_the_floor_below(stage):
+    """A lamp above a slab of Random Walk (Skin), seen: the floor in its shadow. Cycles 5.2, 1024 samples: a diffuse
+    slab would leave .018 of it."""
+    skin = scattering(stage, "RANDOM_WALK_SKIN", 2.0, radius=(1, 0.6, 0.3), color=(0.9, 0.7, 0.4))
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), 1.0, material=skin)
+    solid = stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY")
+    solid.thickness, solid.offset = 0.15, 0.0
+    stage.rectangle(
+        (-10, -10), (10, 10), material=stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), Specular_IOR_Level=0)
+    )
+    stage.light("AREA", location=(0, 0, 3), energy=100, size=1.0)
+    stage.camera((0, -3.2, 0.6), (np.pi / 2 - 0.15, 0, 0), 0.5)
+    floor = shown(stage.render(8, size=(24, 18), bounces=1))[2:6, 8:16].mean(axis=(0, 1))
+    assert floor == pytest.approx((0.193, 0.306, 0.322), rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_mirror_shows_light_that_comes_through(stage):
+    """A ball of wax lit from behind, seen by way of a mirror above it as from below it."""
+    sphere(stage, scattering(stage, "RANDOM_WALK_SKIN", 3.0, radius=(1, 0.6, 0.3)), radius=0.5)
+    stage.light("SUN", turn=(0.0, 0, 0), energy=np.pi, angle=0.1)
+    stage.camera((0, 0, -6), (np.pi, 0, 0), 0.25)
+    straight = shown(stage.render(8, size=(16, 16), bounces=1)).mean(axis=(0, 1))
+    mirror = stage.rectangle((-20, -20), (20, 20), -2.0, material=stage.principled(Metallic=1, Roughness=0))
+    mirror.visible_shadow = False
+    stage.camera((0, 0, 2), (0, 0, 0), 0.25)
+    stage.scene.objects["Sphere"].visible_camera = False
+    mirrored = shown(stage.render(8, size=(16, 16), bounces=1)).mean(axis=(0, 1))
+
+    assert mirrored == pytest.approx(0.8 * straight, rel=0.13)
