@@ -4,6 +4,8 @@
 
 #define DEEP 4.0
 #define DEEPER 12.0
+#define FINE 0.5
+#define COARSEST 0.1
 
 vec4 object_texel(int index)
 {
@@ -49,5 +51,6 @@ float walked_part(Profile profile, vec4 object, float width, float depth)
   }
   vec3 away = profile.share1 * profile.scale1 + profile.share2 * profile.scale2 + profile.share3 * profile.scale3;
   float beyond = smoothstep(0.0, 0.01, max_component(vec3(1.0) - profile_near(profile, min(window_of_walks(object, width), depth))));
-  return beyond * (1.0 - smoothstep(DEEP, DEEPER, depth / max_component(away)));
+  float fine = clamp(FINE * max_component(away) / object.z, COARSEST, 1.0);
+  return beyond * (1.0 - smoothstep(DEEP * fine, DEEPER * fine, depth / max_component(away)));
 }
