@@ -56,6 +56,7 @@ from ..surfaces.scatter_means import ScatterMeans
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
 
 RAYS_INDIRECT = 4  # of a point in a sample
+CHOICE = "surface.walked"
 IMAGES = tuple(f"surface.scatter_{name}" for name in SCATTER_IMAGES)
 
 POINT_TEXTURES = (("RGBA32F", "point_position"), ("RGBA32F", "point_normal"), ("RGBA32F", "point_entry"))
@@ -85,7 +86,7 @@ APPLY = passes.fullscreen_program(
     "subsurface apply",
     "subsurface/apply.frag.glsl",
     textures=tuple(("RGBA32F", name) for name in ("surface_diffuse", "scatter_share", *LEFT, *WALKED)),
-    outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
+    outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect"), ("VEC4", "out_walked")),
 )
 INDIRECT = passes.fullscreen_program(
     "subsurface indirect",
@@ -147,6 +148,7 @@ class ImageSpaceSubsurface(Technique):
         Write(IMAGES[1], "RGBA32F", "Share of the diffuse albedo that does; the object"),
         Write(IMAGES[2], "RGBA32F", "Painted: tint of the light that enters; how translucent the surface is"),
         Write(IMAGES[3], "RGBA32F", "Interface that the view's ray enters by: roughness squared, index of refraction"),
+        Write(CHOICE, "RGBA32F", "Which part of the light from below the surface walks find: black none, white all"),
         *(Write(name, "RGBA32F", "What left the surface takes the place of what entered", True) for name in LIGHT),
     )
 
@@ -173,6 +175,7 @@ class ImageSpaceSubsurface(Technique):
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._materials or frame.receivers is None or not len(frame.receivers.distance):
             frame.target(*IMAGES).clear()
+            frame.target(CHOICE).clear()
             return
         # Light at other points of the film is taken from pixels: repeated, it would be light that enters there.
         repeated_light.forbid(frame)
@@ -342,8 +345,9 @@ class ImageSpaceSubsurface(Technique):
                 },
             )  # fmt: skip
             yield
+        frame.target(CHOICE).clear()
         passes.fullscreen(
-            APPLY, frame.target(*LIGHT),
+            APPLY, frame.target(*LIGHT, CHOICE),
             textures={
                 "surface_diffuse": shown["surface.diffuse"], "scatter_share": shown[IMAGES[1]],
                 **dict(zip(LEFT, left)), **dict(zip(WALKED, walked)),

@@ -6,6 +6,7 @@ void main()
   if (scatter_share_fetch(pixel).w < 4.0) {
     discard;
   }
+  out_walked = vec4(vec3(walked_near_fetch(pixel).w), 1.0);
   out_direct = left_direct_fetch(pixel);
   out_indirect = left_indirect_fetch(pixel);
   vec4 near = walked_near_fetch(pixel);
