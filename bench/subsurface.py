@@ -1,9 +1,10 @@
 """Light below surfaces beside Cycles and EEVEE: `python -m bench subsurface --page docs/subsurface.md`.
 
-Scenes made here: a slab under a pattern, a sphere lit from behind, Suzanne as skin and as wax under two area lights, a
-leaf, a candle, a marble tile, a sphere under the world alone; and of light that comes through: Suzanne's ears and a
-block of wax lit from behind, grapes, a hollow candle with its flame inside, a leaf, an open sheet of cloth of either
-winding, a marble bust with fine contours, milk in a glass, balls whose radius of scattering is .1 to 2 of their own.
+Scenes made here: with `--opaque` a slab under a pattern, a sphere lit from behind, Suzanne as skin and as wax under two
+area lights, a leaf, a candle, a marble tile, a sphere under the world alone; else light that comes through: Suzanne's
+ears and a block of wax lit from behind, grapes, a hollow candle with its flame inside, a leaf, an open sheet of cloth
+of either winding, a marble bust with fine contours, milk in a glass, balls whose radius of scattering is .1 to 2 of
+their own.
 Each with the methods that Cycles has. The error is relMSE of Combined (no speculars: it is diffuse light) against the
 mean of two renders by Cycles, with the noise of that mean (a quarter of what the two differ by) taken off, and the mean
 beside Cycles'. Seconds are those of processors, of renders after one that compiled. A first table takes Candela's least
@@ -420,14 +421,14 @@ def page_through(rows: list[tuple[str, ...]], size: tuple[int, int], reference: 
 
 
 COMMAND = "python -m bench subsurface --page docs/subsurface.md"
-COMMAND_THROUGH = "python -m bench subsurface --through --page docs/subsurface.md"
+COMMAND_OPAQUE = "python -m bench subsurface --opaque --page docs/subsurface.md"
 FEW = (("CANDELA", 1), ("CANDELA", 16), (DENOISED, 16))  # entrants of light that comes through
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     every = [*SCENES, *THROUGH]
     parser.add_argument("--scenes", nargs="+", choices=every, metavar="NAME", help="default all of either table")
-    parser.add_argument("--through", action="store_true", help="the table of light that comes through")
+    parser.add_argument("--opaque", action="store_true", help="scenes in which little light comes through, and EEVEE")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS, metavar="METHOD")
     parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out, which compiles for minutes")
     parser.add_argument("--size", type=size_of, default=(96, 96), metavar="WxH", help="default 96x96")
@@ -442,7 +443,7 @@ def command(options: argparse.Namespace) -> int:
     addon.register()
     rows: list[tuple[str, ...]] = []
     entrants = tuple(one for one in ENTRANTS if not (options.no_eevee and one[0] == "BLENDER_EEVEE"))
-    through = options.through
+    through = not options.opaque
     entrants = FEW if through else entrants
     for name in options.scenes or (THROUGH if through else SCENES):
         for method in options.methods:
@@ -451,5 +452,5 @@ def command(options: argparse.Namespace) -> int:
             rows += added
             if options.page:
                 text = (page_through if through else page)(rows, options.size, options.reference)
-                markdown.put_between(options.page, COMMAND_THROUGH if through else COMMAND, text)
+                markdown.put_between(options.page, COMMAND if through else COMMAND_OPAQUE, text)
     return 0

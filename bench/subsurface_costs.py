@@ -1,9 +1,9 @@
 """What light below surfaces costs, painted maps and thin parts: `python -m bench subsurface_costs --page`.
 
-Four parts for docs/subsurface.md: the cost of a picture by points, by range in pixels, by resolution and by number of
+Five parts for docs/subsurface.md: the cost of a picture by points, by range in pixels, by resolution and by number of
 materials, beside diffuse ones; three painted scenes (a face with tinted cheeks that are soft or sharp, veins, a candle
 with an opaque wick) with maps and without; walks through slabs from .25 to 8 mean free paths thick that are lit from
-behind, beside Cycles. Seconds are medians of renders of 4 samples after one that compiled.
+behind, beside Cycles; and closed forms of slabs. Seconds are medians of renders of 4 samples after one that compiled.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from . import markdown, subsurface
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "subsurface.md"
 COMMAND = "python -m bench subsurface_costs --page"
 SIZE, SAMPLES, REPEATS, ROUNDS = (96, 96), 4, 2, 4
-PARTS = ("cost", "painted", "thin")
+PARTS = ("cost", "painted", "thin", "slabs")
 MAP = 256  # pixels of a side of painted maps
 
 
@@ -35,7 +35,7 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     for name in options.parts:
-        table = {"cost": costs, "painted": lambda: painted(options.pictures), "thin": thin}[name]()
+        table = {"cost": costs, "painted": lambda: painted(options.pictures), "thin": thin, "slabs": slabs}[name]()
         print(table, flush=True)
         if options.page:
             markdown.put_between(PAGE, f"{COMMAND} --parts {name}", table)
@@ -253,4 +253,65 @@ def thin() -> str:
                     [method, f"{color}", f"{thick:g}", *(f"{m:.4f}" for m in means), f"{means[1] / means[0]:.2f}"]
                 )  # fmt: skip
                 print(rows[-1], flush=True)
+    return markdown.table(rows)
+
+
+# Closed forms ---------------------------------------------------------------------------------------------------------
+
+
+def walked(paths: float, albedo: float, walks: int = 400_000) -> tuple[float, float]:
+    """Shares of walks, straight into a slab so many free paths thick, that leave it in front and behind."""
+    random = np.random.default_rng(1)
+    z, along, left = np.zeros(walks), np.ones(walks), np.zeros(2)
+    while len(z):
+        z = z - along * np.log(random.random(len(z)))
+        left += (z < 0.0).sum(), (z > paths).sum()
+        stays = (z >= 0.0) & (z <= paths) & (random.random(len(z)) < albedo)
+        z, along = z[stays], random.uniform(-1.0, 1.0, stays.sum())
+    return float(left[0]) / walks, float(left[1]) / walks
+
+
+def slabs() -> str:
+    """Slabs of Random Walk, seen and lit straight, by thickness in mean free paths: what leaves on the lit side and on
+    the other, beside plain walks and diffusion (multipole); and a white ball in an even world."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+    from addon.kernels import diffusion
+
+    color, free = 0.8, 0.1
+    albedo = 1.0 - float(diffusion.walk_absorption(np.array(color))) ** 2
+    medium = diffusion.Medium((1.0 - albedo) / free, albedo / free, 0.0, 1.0)
+
+    def rendered() -> float:
+        found = render_passes(bpy.context.scene, "CANDELA", 8, 1, size=(24, 24), bounces=0)
+        return float(found.images["combined"][..., :3].mean())
+
+    head = ["thickness / mean free path", "side", "plain walk", "Candela", "ratio", "diffusion"]
+    rows = [head]
+    for thick in (0.25, 0.5, 1.0, 2.0, 4.0, 8.0):
+        plain = walked(thick, albedo)
+        diffuse = [float(one) for one in diffusion.multipole(medium, thick * free)]
+        for side, turn in ((0, 0.0), (1, np.pi)):
+            subsurface.clear()
+            shown = subsurface.material("RANDOM_WALK", (color,) * 3, (1.0, 1.0, 1.0), 4.0 * np.pi * free)
+            subsurface.node_of(shown, "BSDF_PRINCIPLED").inputs["Roughness"].default_value = 0.0
+            cube = bpy.ops.mesh.primitive_cube_add
+            subsurface._shape(cube, shown, False, size=1, scale=(6, 6, thick * free))
+            subsurface.light("SUN", turn=(turn, 0, 0), energy=np.pi, angle=0.0)
+            subsurface.camera((0, 0, 8), (0, 0, 0), span=0.5)
+            mean = rendered()
+            name = ("lit", "other")[side]
+            rows.append([
+                f"{thick:g}", name, f"{plain[side]:.4f}", f"{mean:.4f}", f"{mean / plain[side]:.3f}",
+                f"{diffuse[side]:.4f}",
+            ])  # fmt: skip
+            print(rows[-1], flush=True)
+    subsurface.clear()
+    white = subsurface.material("RANDOM_WALK", (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 4.0 * np.pi * 0.3)
+    subsurface._ball(white, (0, 0, 0), 1.0)
+    subsurface.even_world((1, 1, 1), 1.0)
+    subsurface.camera((0, 0, 5), (0, 0, 0), span=0.5)
+    mean = rendered()
+    rows.append(["white ball in a white world", "all", "1.0000", f"{mean:.4f}", f"{mean:.3f}", "1.0000"])
     return markdown.table(rows)
