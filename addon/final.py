@@ -17,6 +17,7 @@ from .film import catcher
 from .film.noise import NoiseMeter
 from .frame import ledger as ledgers
 from .frame import slices, time_steps
+from .frame.light_paths import LIGHT_PATHS
 from .frame.picture import Frame
 from .frame.run import Renderer
 from .frame.settings import Settings
@@ -354,11 +355,36 @@ def mean_images(
     return arrays
 
 
+def _has_negative_light(frame: Frame) -> bool:
+    """Whether a lamp, a material or the world takes light away."""
+    snapshot = frame.snapshot
+    lamps = any(np.min(light.strength) < 0 for light in snapshot.lights)
+    materials = any(min(*one.emission, *one.emission_behind) < 0 for one in frame.materials.compiled)
+    return lamps or materials or bool(frame.environment.color.min() < 0 or frame.environment.pixels.min() < 0)
+
+
+def _without_negative(arrays: dict[str, np.ndarray], exposure: float) -> None:
+    """Raise to 0 what estimates by differences (a world's irradiance, known where nothing is in the way) have left
+    below it in single pixels of few samples; the picture stays the sum of its light."""
+    added = 0.0
+    for path in LIGHT_PATHS:
+        light = arrays.get(path.image)
+        if light is not None and (light[..., :3] < 0).any():
+            raised = np.maximum(light[..., :3], 0.0)
+            added = added + (raised - light[..., :3])
+            light[..., :3] = raised
+    picture = arrays[COMBINED]
+    if (picture[..., :3] < 0).any() or np.any(added):
+        picture[..., :3] = np.maximum(picture[..., :3] + exposure * added, 0.0)
+
+
 def pixels_of(
     total: light_groups.Sum, frame: Frame, wanted: list[RenderPass], plates: tuple | None = None
 ) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     arrays = total.finished({name for asked in wanted for name in asked.images})
+    if not _has_negative_light(frame):
+        _without_negative(arrays, frame.snapshot.film.exposure)
     arrays[CATCHER.source] = np.ones_like(arrays[COMBINED][..., :3])
     if plates:
         everything, plate, transparent = plates

@@ -38,10 +38,10 @@ def test_strands_grow_from_the_mesh_with_the_radius_of_their_settings(stage):
     low, high = mesh.bounds_min, mesh.bounds_max
     assert low[2] == pytest.approx(0.0, abs=0.02) and high[2] == pytest.approx(0.5, abs=0.02)
     assert (low[:2] > -0.05).all() and (high[:2] < 1.05).all()
-    # A tube of four sides is a little wider than the strand: pi / (4 sin(pi / 4)).
+    # A tube of twelve sides is a little wider than the strand: pi / (12 sin(pi / 12)).
     roots = mesh.positions[mesh.positions[:, 2] < 1e-4]
-    centres = roots.reshape(-1, 4, 3).mean(axis=1, keepdims=True)
-    assert np.linalg.norm(roots.reshape(-1, 4, 3) - centres, axis=2) == pytest.approx(0.02 * 1.1107, rel=1e-3)
+    centres = roots.reshape(-1, 12, 3).mean(axis=1, keepdims=True)
+    assert np.linalg.norm(roots.reshape(-1, 12, 3) - centres, axis=2) == pytest.approx(0.02 * 1.0115, rel=1e-3)
 
 
 def test_children_hide_their_parents(stage):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from addon.snapshot import SnapshotCache
-from addon.snapshot.strands import SIDES, STEPS, spheres, tubes
+from addon.snapshot.strands import ROUND_SIDES, STEPS, spheres, tubes
 
 
 def shadow_width(positions, triangles, direction):
@@ -18,13 +18,14 @@ def shadow_width(positions, triangles, direction):
 def test_a_straight_hair_is_a_tube_of_its_radius_and_mean_width():
     points = np.array([[0, 0, 0], [0, 0, 1], [0, 0, 3]], np.float32)
     positions, normals, triangles, source = tubes(points, np.full(3, 0.1), np.array([0, 3]))
-    assert len(positions) == (2 * STEPS + 1) * SIDES
+    assert len(positions) == (2 * STEPS + 1) * ROUND_SIDES[0]
     assert positions[:, 2].min() == 0.0 and positions[:, 2].max() == 3.0
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
     np.testing.assert_allclose(normals[:, 2], 0.0, atol=1e-6)
     turns = np.linspace(0, np.pi, 64, endpoint=False)
     width = [shadow_width(positions, triangles, np.array([np.cos(a), np.sin(a), 0])) / 3.0 for a in turns]
     assert np.mean(width) == pytest.approx(0.2, rel=1e-3)
+    np.testing.assert_allclose(width, 0.2, rtol=0.03)  # from every side
     assert sorted(set(source)) == [0, 1, 2]
 
 
@@ -82,7 +83,7 @@ def test_hair_and_points_are_meshes_of_the_snapshot(stage):
     cache = SnapshotCache()
     snapshot = stage.take(cache)
     (mesh,) = snapshot.meshes.values()
-    assert len(mesh.triangle_corners) == 2 * STEPS * SIDES * 2
+    assert len(mesh.triangle_corners) == 2 * STEPS * ROUND_SIDES[0] * 2
     assert mesh.bounds_max[2] == pytest.approx(2.0, abs=0.03)
     assert snapshot.instances[0].object_name == "Hair"
     again = stage.take(cache)
