@@ -15,6 +15,7 @@ import numpy as np
 
 from ..frame.picture import Frame
 from ..frame.technique import Service
+from ..gfx.context import to_hold
 from ..materials.compiler import may_emit
 from ..sources import lights
 from .emissive_triangles import PATHS, EmissiveTriangles
@@ -62,6 +63,12 @@ class PathSources:
         self.world_flags = sum(PATHS[path] * getattr(seen, path) for path in self.paths)
         if frame.environment.power <= 0:
             self.world_flags = 0
+
+    @property
+    def kinds(self) -> int:
+        """Of all these, as bits, for LIGHT_KINDS of a program."""
+        others = (self._triangles is not None) << lights.SURFACE | bool(self.world_flags) << lights.DIRECTION
+        return to_hold(lights.kinds_of(self._emitters) | others, -1)
 
     @property
     def emissive_power(self) -> float:

@@ -119,7 +119,8 @@ def _outputs(transmission: bool, orders: tuple[str, ...]) -> tuple[tuple[str, st
 
 
 @cache
-def found_program(transmission: bool) -> Program:
+def found_program(kinds: int, transmission: bool) -> Program:
+    """For sources of these kinds (bits as in lights.LAMPS; -1: any)."""
     return passes.fullscreen_program(
         "light found by rays",
         "hits/found.frag.glsl",
@@ -132,13 +133,14 @@ def found_program(transmission: bool) -> Program:
             ("INT", "light_count"), ("INT", "world_glossy"), ("INT", "world_transmission"), ("FLOAT", "world_samples"),
             ("VEC4", "emissive"), ("INT", "ray_number"),
         ),
-        defines=(("TRANSMISSION", "1"),) if transmission else (),
+        defines=(("LIGHT_KINDS", str(kinds)), *((("TRANSMISSION", "1"),) if transmission else ())),
         outputs=_outputs(transmission, ORDERS),
     )  # fmt: skip
 
 
 @cache
-def received_program(transmission: bool, soft_lobes: bool) -> Program:
+def received_program(kinds: int, transmission: bool, soft_lobes: bool) -> Program:
+    """For sources of these kinds (bits as in lights.LAMPS; -1: any)."""
     return passes.fullscreen_program(
         "light at hits",
         "hits/received.frag.glsl",
@@ -148,7 +150,9 @@ def received_program(transmission: bool, soft_lobes: bool) -> Program:
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
         constants=(("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "repeats"), *REACH, *NEAR_CONSTANTS),
-        defines=((("TRANSMISSION", "1"),) if transmission else ()) + SOFT_DEFINES[soft_lobes],
+        defines=(
+            ("LIGHT_KINDS", str(kinds)), *((("TRANSMISSION", "1"),) if transmission else ()), *SOFT_DEFINES[soft_lobes],
+        ),
         outputs=_outputs(transmission, ("indirect",)),
     )  # fmt: skip
 
@@ -167,8 +171,11 @@ def guide_program(transmission: bool) -> Program:
 
 PROGRAMS = (
     *(scatter_program(onward) for onward in (False, True)),
-    *(found_program(transmission) for transmission in (False, True)),
-    *(received_program(True, soft) for soft in (False, True)),
+    *(found_program(-1, transmission) for transmission in (False, True)),
+    *(
+        received_program(kinds, transmission, soft)
+        for kinds, transmission, soft in ((-1, True, True), (0, False, False))
+    ),
 )
 DECLARED = guide_program(False), guide_program(True)
 
@@ -368,7 +375,7 @@ class ShadedReflections(Technique, BothWays):
         emissive = frame.service(EmissivePoints) or EmissivePoints()
         bound = closure_bindings(closures)
         passes.fullscreen(
-            found_program(transmission),
+            found_program(self._sources.kinds, transmission),
             self._target(transmission, ORDERS, records.target.depth),
             blend="ADDITIVE_PREMULT",
             where=ANY_RAY,
@@ -416,7 +423,7 @@ class ShadedReflections(Technique, BothWays):
         if provided is not None:
             near = {name: provided.bindings["constants"][name] for name in near}
             textures = {name: provided.bindings["textures"][name] for name in textures}
-        program = sending(frame, received_program(transmission, frame.materials.soft), textures)
+        program = sending(frame, received_program(self._sources.kinds, transmission, frame.materials.soft), textures)
         program = dimmed(frame, program, textures)
         passes.fullscreen(
             program,

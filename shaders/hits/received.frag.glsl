@@ -3,7 +3,9 @@
 // that ray but for its share of the points.
 #define PART 128  // virtual lights that a hit looks at
 #include "indirect/near.glsl"
+#ifdef TRANSMISSION
 #include "lib/refraction.glsl"
+#endif
 #ifdef SOFT_LOBES
 #include "lib/soft_lobe.glsl"
 #endif
@@ -18,7 +20,9 @@ struct Receiver {
   bool ended;      // would be, but for the number of bounces: shows nothing
   int mirrored;    // by so many surfaces on the way to the camera
   Lobe lobe;
+#ifdef TRANSMISSION
   Interface glass;
+#endif
 };
 
 // Radiance towards the viewer by a source if nothing blocks it.
@@ -33,9 +37,11 @@ vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, flo
   if (r.shines && (light.flags & LIGHT_GLOSSY) != 0 && dot(direction, r.surface.geometric_normal) > 0.0) {
     of_lobe = lobe_reflection(r.lobe, direction, lobe_density);
   }
+#ifdef TRANSMISSION
   if (r.bends && (light.flags & LIGHT_TRANSMISSION) != 0) {
     of_lobe = interface_value(r.glass, direction, lobe_density);
   }
+#endif
   if (r.followed && density > 0.0) {
     of_lobe *= power_share(light.rate * density, lobe_density);
   }
@@ -142,7 +148,11 @@ void main()
   r.surface = SURFACE_READ(pixel);
   r.viewer = -ray_direction_fetch(pixel).xyz;
   bool has_lobe = max_component(r.surface.glossy_weight) > 0.0;
+#ifdef TRANSMISSION
   r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;
+#else
+  r.bends = false;
+#endif
   r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
   r.mirrored = path_mirrors(code);
   bool goes_on = r.bends || r.surface.glossy_roughness <= shaded_roughness;
@@ -151,8 +161,10 @@ void main()
   r.ended = has_lobe && goes_on && !r.followed;
   r.lobe = lobe_begin(r.surface, r.viewer);
   r.shines = r.shines && !lobe_is_mirror(r.lobe);
+#ifdef TRANSMISSION
   r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,
                             r.surface.glossy_tint, r.surface.glossy_edge.x > 0.5, r.surface.glossy_weight, vec3(0.0));
+#endif
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + ray_number);
   // Light from below the surface takes the place of what a diffuse one would send.
   vec3 diffuse = r.surface.diffuse;

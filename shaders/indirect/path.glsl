@@ -260,8 +260,6 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
   vec3 origin = ray_origin(position, met.lit);
   float bump = (met.upright < 0.99999) ? clamp(0.125 * (1.0 / (met.upright * met.upright) - 1.0), 0.0, 1.0) : 0.0;
   vec3 sum = met.leaving;
-  Reflection reflection = met.reflection;
-  reflection.diffuse *= met.straight;
   uint roll = salt;
   for (int group = 0; group < min(light_rays, light_count); group++) {
     float total = 0.0;
@@ -296,6 +294,8 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
       chosen_light *= passing_media(origin, chosen_direction, light_distance(light, origin, chosen_direction), salt);
+      Reflection reflection = met.reflection;
+      reflection.diffuse *= met.straight;
 #ifdef MIRRORS_OWNED
       if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
         reflection.straight = reflection.grazing = vec3(0.0);
