@@ -110,6 +110,8 @@ def prepared(snapshot: Snapshot, points: BakedPoints, width: int, height: int) -
     camera = snapshot.camera
     if not points.through_camera or camera is None:
         camera = seen_from_above(instance, snapshot.meshes[instance.mesh], width, height)
+    # Of a panoramic camera, too, only where it stands counts.
+    straight = {} if camera.panorama is None else {"kind": "PERSPECTIVE", "panorama": None}
     film = Film(
         width, height, (0, 0, width, height), SIZE, caustics_reflective=snapshot.film.caustics_reflective,
         caustics_refractive=snapshot.film.caustics_refractive,
@@ -117,7 +119,7 @@ def prepared(snapshot: Snapshot, points: BakedPoints, width: int, height: int) -
     world = replace(snapshot.world, medium=None, volume=None)  # what would lie between a surface and its viewer
     return replace(
         snapshot,
-        camera=replace(camera, aperture=None, bends=points.through_camera),
+        camera=replace(camera, aperture=None, bends=points.through_camera, **straight),
         film=film,
         baked=points,
         motion=None,
