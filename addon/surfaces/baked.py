@@ -28,7 +28,7 @@ from ..snapshot.scene import BakedPoints, Instance, Mesh
 from .hits import Hits, Records
 
 NEUTRAL = 0  # of Snapshot.materials
-BENT_OFFSET = 0.2  # as of Cycles and shaders/lib/gbuffer.glsl
+BENT_OFFSET = 0.2  # as of Cycles and shaders/ask/view.glsl
 
 
 class BakedSurface:
@@ -115,7 +115,7 @@ def _columns(
 
 
 def _bent(toward: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Directions to a viewer that sees what faces away, too: viewer_of of shaders/lib/gbuffer.glsl."""
+    """Directions to a viewer that sees what faces away, too: view_of_surface of shaders/ask/view.glsl."""
     above = (toward * normal).sum(axis=1, keepdims=True)
     raised = _unit(toward - normal * np.minimum(above - BENT_OFFSET, 0.0))
     return np.where(above <= 0.0, _unit(raised + (normal - raised) * -above), raised)

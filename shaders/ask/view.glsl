@@ -48,6 +48,30 @@ vec3 view_toward(vec3 position)
   return view_is_parallel(film_view.eye) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - position);
 }
 
+// Whether the picture is a bake: each of its places is seen from above itself (eye.w of the view is 2), or from a camera
+// that bends around corners as that of Cycles does (eye.w is below 0, or 1.25 where its rays are parallel).
+bool view_is_baked()
+{
+  return film_view.eye.w > 1.1 || film_view.eye.w < 0.0;
+}
+
+#define BENT_OFFSET 0.2
+
+// Unit direction from a place of a surface to whom sees it.
+vec3 view_of_surface(vec3 position, vec3 normal)
+{
+  if (film_view.eye.w > 1.5) {
+    return normal;
+  }
+  vec3 toward = view_toward(position);
+  float above = dot(toward, normal);
+  if (!view_is_baked() || above > BENT_OFFSET) {
+    return toward;
+  }
+  vec3 raised = safe_normalize(toward - normal * (above - BENT_OFFSET));
+  return (above <= 0.0) ? safe_normalize(mix(raised, normal, -above)) : raised;
+}
+
 // Distance along the axis, and that of a ray's place from where it begins.
 float view_depth(vec3 position)
 {

@@ -29,7 +29,7 @@ void main()
   if (s.hit) {
     coverage = 1.0 - s.holdout;
     limit = dot(s.position - origin, direction);
-    direction = (film_view.eye.w > 1.1 || film_view.eye.w < 0.0) ? -TO_VIEWER(s) : direction;
+    direction = view_is_baked() ? -TO_VIEWER(s) : direction;
     out_emission.rgb = s.emission;
     out_diffuse_color.rgb = s.diffuse;
     out_normal = vec4(s.normal, 1.0);

@@ -58,22 +58,8 @@ struct Surface {
 #define SURFACE_READ(pixel) SURFACE_DECODED(pixel)
 #endif
 
-// Towards whom sees a surface. Of a bake each place is seen from above itself (eye.w of the view is 2), or from a camera that
-// bends around corners as that of Cycles does (eye.w is below 0, or 1.25 where its rays are parallel).
-#define TO_VIEWER(s) \
-  ((film_view.eye.w > 1.5) ? s.normal : viewer_of(film_view.eye.w, view_toward(s.position), s.normal))
-
-#define BENT_OFFSET 0.2
-
-vec3 viewer_of(float eye, vec3 toward, vec3 normal)
-{
-  float above = dot(toward, normal);
-  if ((eye >= 0.0 && eye < 1.1) || above > BENT_OFFSET) {
-    return toward;
-  }
-  vec3 raised = safe_normalize(toward - normal * (above - BENT_OFFSET));
-  return (above <= 0.0) ? safe_normalize(mix(raised, normal, -above)) : raised;
-}
+// Towards whom sees a surface.
+#define TO_VIEWER(s) view_of_surface(s.position, s.normal)
 
 // Alpha squared of microfacets that deviate from the normal as the bumped one does.
 float bump_squared(vec3 normal, vec3 bumped)

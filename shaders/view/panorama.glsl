@@ -176,6 +176,16 @@ vec3 view_toward(vec3 position)
   return safe_normalize(panorama_eye(position) - position);
 }
 
+bool view_is_baked()
+{
+  return false;
+}
+
+vec3 view_of_surface(vec3 position, vec3 normal)
+{
+  return view_toward(position);
+}
+
 // Blender's passes have the distance as depth.
 float view_depth(vec3 position)
 {
