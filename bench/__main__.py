@@ -31,6 +31,7 @@ from bench import (
     memory,
     micro_rendering,
     mutations,
+    orbit,
     others,
     page,
     pairs,
@@ -89,6 +90,7 @@ VERBS = {
     "mutations": mutations,
     "pairs": pairs,
     "flicker": flicker,
+    "orbit": orbit,
     "all": everything,
 }
 

@@ -35,6 +35,7 @@ from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
 from ..sources.lights import Emitter, emitters
 from .bands import Bands
+from .history import Before
 from .ledger import Ledger
 from .plan import Plan
 from .settings import Settings
@@ -90,6 +91,8 @@ class Frame:
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     more_writes: list[Write] = field(default_factory=list)  # see `add_write`
     read_last: set[str] = field(default_factory=set)  # images of the last sample that `end` reads; said in `begin`
+    before: Before | None = None  # the picture before this one, where techniques remember it
+    first_rows: np.ndarray | None = None  # `view_rows` of the first sample
     carried: dict[str, images.Image] = field(default_factory=dict)  # ranked pairs of other frames; see `empty`
     readback: Readback = field(default_factory=Readback)
     _services: dict[type[Service], Service] = field(default_factory=dict)
@@ -181,6 +184,8 @@ class Frame:
         if self.snapshot.camera.panorama is not None:
             self.tiles = self.tiles or panorama.tiles_of(self.view)
             panorama.look(self.tiles, self.view, number, settings.seed, self.geometry.size, lens, self._footprints())
+        if self.is_first and film is None:
+            self.first_rows = self.view_rows
 
     def _footprints(self) -> tuple[float, float]:
         """Sides in pixels of the squares over which lookups of textures average (materials/averages.py). All samples
@@ -341,6 +346,8 @@ class Frame:
         """Give back the images of the frame."""
         self.readback.drop()
         self._texel_counters.drop()
+        if self.before is not None:
+            self.before.drop()
         for image in self.images.values():
             images.pool.give(image)
 

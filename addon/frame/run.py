@@ -28,7 +28,7 @@ from ..scene.world_tree import WorldTree
 from ..snapshot.scene import NO_LINKS, RANKED, Note, Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
-from . import device_probe
+from . import device_probe, history
 from . import ledger as ledger_module
 from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .picture import Frame
@@ -54,6 +54,7 @@ class Renderer:
         self._keys: dict[str, object] = {}
         self._lasting: dict[type, object] = {}  # what frames share, by class
         self._frame_key: object = None
+        self._light: object = None  # what gives the frame's light, see frame/history.py
         self._view_block: Block | None = None
         context.on_release(self.release)
 
@@ -110,7 +111,8 @@ class Renderer:
             dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes))
         )
 
-        key = self._content_key(snapshot, settings, plan)
+        light = self._light_key(snapshot, settings, plan)
+        key = self._content_key(snapshot, settings, light)
         if self.frame is not None and not geometry_changed and key == self._frame_key:
             ledger.rows = [
                 Row(t.name, t.label, REUSED, "nothing changed", slot=", ".join(plan.slots_of(t)))
@@ -120,13 +122,16 @@ class Renderer:
             self.frame.ledger = ledger
             self.frame.profiler = Profiler(settings.profile)
             self.frame.counters = {}
-            self.frame.settings = settings
+            self.frame.settings = replace(settings, seed=self.frame.settings.seed)  # see frame/history.py
             self.frame.snapshot = snapshot  # the same but for what only `show` asks for, as the time
             return self.frame
         yield from compiling(self._programs(plan, snapshot, settings))
         ledger.times["compile"] = watch.compiling
         self._frame_key = key
+        before = history.usable(history.remembered(self.frame, self._light), snapshot, light)
         self._drop_frame()
+        self._light, asked = light, settings
+        settings = history.seeded(settings, before)
         values = view.values(0, settings.seed, (0.0, 0.0), self.geometry.size)
         if self._view_block is None:
             self._view_block = Block(VIEW, **values)
@@ -135,6 +140,7 @@ class Renderer:
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
             self._surface_means, self._opacity, self._glow, self._lamp_maps, lasting=self._lasting,
+            before=before,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -143,7 +149,7 @@ class Renderer:
                 if write.name not in frame.images and not write.by_need:
                     frame.images[write.name] = images.pool.take(*frame.size, write.format)
         for technique in plan.techniques:
-            wanted = technique.key(snapshot, settings)
+            wanted = technique.key(snapshot, asked)
             if technique.name not in self._keys or self._keys[technique.name] != wanted:
                 with frame.profiler.step(technique.name):
                     technique.prepare(frame)
@@ -385,22 +391,28 @@ class Renderer:
             wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
         return list(dict.fromkeys(wanted))
 
-    def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
-        camera = snapshot.camera
+    def _light_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
+        """Equal for two pictures whose surfaces receive the same light, but for what moves."""
         # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
         casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
             lights_key(snapshot), self._lamp_maps.changes, casters, self._environment[0], self.materials.fingerprint(),
-            volumes_key(snapshot), snapshot.film,
-            camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
-            camera.panorama,
-            settings.seed, settings.bounces, settings.draft, settings.shows, settings.whole and settings.samples,
-            settings.whole and (settings.sample_offset, settings.samples_to_draw),
-            settings.whole and (settings.time_limit, settings.noise_threshold),
+            volumes_key(snapshot), settings.bounces, settings.draft,
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple(one.links for one in snapshot.instances if one.links is not NO_LINKS),
             snapshot.own_values,
+        )  # fmt: skip
+
+    @staticmethod
+    def _content_key(snapshot: Snapshot, settings: Settings, light: tuple) -> tuple:
+        camera = snapshot.camera
+        return (
+            light, snapshot.film,
+            camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
+            camera.panorama, settings.seed, settings.shows, settings.whole and settings.samples,
+            settings.whole and (settings.sample_offset, settings.samples_to_draw),
+            settings.whole and (settings.time_limit, settings.noise_threshold),
             snapshot.motion and snapshot.motion.key,
             snapshot.baked,
         )  # fmt: skip

@@ -145,6 +145,7 @@ class Technique:
     finishes: tuple[str, ...] = ()  # images that it takes up after all other techniques that write them
     provides: tuple[type[Service], ...] = ()
     requests: tuple[type[Service], ...] = ()  # services whose providers run before it in each stage
+    remembers: tuple[Write, ...] = ()  # of its writes: the next picture has them as frame.before (history.py)
     owns: tuple[str, ...] = ()  # kinds of transport that it takes over (light_paths.TRANSPORTS)
 
     @classmethod

@@ -50,6 +50,7 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
+from . import probes
 from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
 from .leaving_light import lit_at_hits
@@ -70,7 +71,7 @@ PATH_BLOCKS = ((VIEW, "film_view"), (lights.SOURCES, "sources"))
 PATH_CONSTANTS = (
     ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "bounces"),
 )  # fmt: skip
-PROBE_CONSTANTS = (("IVEC2", "probes"), ("INT", "rays"))
+RAYS = (("INT", "rays"),)  # of each probe
 
 
 # Of each candidate: its place; its normal; radiance of what its own path alone says, w: luminance of the part that was
@@ -86,9 +87,9 @@ def candidates_program(kinds: int) -> Program:
     return passes.fullscreen_program(
         "virtual light candidates",
         "indirect/candidates.frag.glsl",
-        textures=PATH_TEXTURES,
+        textures=(*PATH_TEXTURES, *probes.TEXTURES),
         blocks=PATH_BLOCKS,
-        constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
+        constants=(*PATH_CONSTANTS, *RAYS),
         defines=(("LIGHT_KINDS", str(kinds)),),
         outputs=tuple(("VEC4", f"out_{name}") for name in FOUND),
     )
@@ -98,11 +99,14 @@ CANDIDATES = tuple(candidates_program(kinds) for kinds in (-1, 0))
 DENSITY = passes.fullscreen_program(
     "virtual light density",
     "indirect/density.frag.glsl",
-    textures=(*PATH_TEXTURES, ("RGBA32F", "candidate_point"), ("RGBA32F", "candidate_normal"), ("RGBA32F", "slots")),
-    blocks=PATH_BLOCKS,
-    constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES, *probes.TEXTURES, ("RGBA32F", "candidate_point"),
+        ("RGBA32F", "candidate_normal"), ("RGBA32F", "slots"),
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "offset_size"), *RAYS),
     outputs=(("FLOAT", "out_density"),),
-)
+)  # fmt: skip
 PAIRS = passes.fullscreen_program(
     "virtual light pairs",
     "indirect/pairs.frag.glsl",
@@ -194,8 +198,9 @@ class VirtualLights:
         grid = Grid.of(frame, count)
         candidates = grid.count * grid.rays
         choice = Choice(grid.rays, candidates, seen_middle(frame))
-        found = self._candidates(frame, grid)
-        held = [*found.values()]
+        views = probes.find(frame, grid.probes, self.path_bindings(frame))
+        found = self._candidates(frame, grid, views)
+        held = [*views.values(), *found.values()]
         try:
             yield
             order = choice.order(found["candidate_point"], found["candidate_normal"])
@@ -208,7 +213,7 @@ class VirtualLights:
             radiances = choice.radiances(found, pairs, frame.service(MediaService))
             slots, kept_before = choice.keep(count, frame.random("virtual lights/keep")[0])
             yield
-            densities = self._densities(frame, grid, found, slots)
+            densities = self._densities(frame, grid, views, found, slots)
             held.append(densities)
             yield
             self._make_image(frame, grid, {**found, "slots": slots, "radiances": radiances, "densities": densities})
@@ -314,16 +319,13 @@ class VirtualLights:
                 rows.append(row)
         return rows
 
-    def _probing(self, frame: Frame, grid: Grid) -> dict:
-        bindings = self.path_bindings(frame)
-        bindings["constants"] |= {"probes": grid.probes, "rays": grid.rays}
-        return bindings
-
-    def _candidates(self, frame: Frame, grid: Grid) -> dict[str, images.Image]:
+    def _candidates(self, frame: Frame, grid: Grid, views: dict[str, images.Image]) -> dict[str, images.Image]:
         """Images of the pool by the names of FOUND, a row per probe."""
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
-        bindings = self._probing(frame, grid)
+        bindings = self.path_bindings(frame)
+        bindings["constants"]["rays"] = grid.rays
+        bindings["textures"] |= views
         program = lit_at_hits(frame, candidates_program(self.kinds), bindings["textures"])
         passes.fullscreen(program, found, **bindings)
         return {name if "next" in name else f"candidate_{name}": image for name, image in zip(FOUND, found.colors)}
@@ -340,14 +342,24 @@ class VirtualLights:
         return pairs
 
     def _densities(
-        self, frame: Frame, grid: Grid, found: dict[str, images.Image], slots: images.Image
-    ) -> images.Image:  # fmt: skip
+        self,
+        frame: Frame,
+        grid: Grid,
+        views: dict[str, images.Image],
+        found: dict[str, images.Image],
+        slots: images.Image,
+    ) -> images.Image:
         """How many rays of each probe (row) fall on a square metre around each candidate that is kept (column)."""
-        bindings = self._probing(frame, grid)
         names = ("candidate_point", "candidate_normal")
-        bindings["textures"] |= {name: found[name] for name in names} | {"slots": slots}
         densities = images.pool.take(slots.width, grid.count, "R32F")
-        passes.fullscreen(DENSITY, images.Target((densities,)), **bindings)
+        passes.fullscreen(
+            DENSITY, images.Target((densities,)),
+            textures={
+                **frame.hierarchy("diffuse").textures, **views, **{name: found[name] for name in names}, "slots": slots,
+            },
+            blocks={"film_view": frame.view_block},
+            constants={"offset_size": frame.offset_size, "rays": grid.rays},
+        )  # fmt: skip
         return densities
 
     def _give(self) -> None:

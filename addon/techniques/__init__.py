@@ -19,6 +19,7 @@ from .environment_light import EnvironmentLight
 from .eye import EyeModel
 from .film import Film
 from .grass import Grass
+from .history import History
 from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .implicit_visibility import ImplicitVisibility
@@ -77,6 +78,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ImageSpaceSubsurface,
     ShaderAovs,
     Cryptomatte,
+    History,
     Film,
     Denoise,
     TemporalGlare,

@@ -17,7 +17,7 @@ void main()
   if (!probe.receives) {
     return;
   }
-  uint salt = uint(place.x + place.y * 977);
+  uint salt = uint(place.x) + probe.id * 977u;
   uvec3 bits = hash3(uvec3(salt, 23u, uint(film_view.seed)));
   // The probe's rays fill strata of the first number, and over the samples a net in both.
   vec2 u = vec2((float(place.x) + scrambled(film_view.bits_x, bits.x)) / float(rays), scrambled(film_view.bits_y, bits.y));

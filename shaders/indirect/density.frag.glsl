@@ -1,5 +1,8 @@
 // How densely the rays of the probes fall on a candidate that was kept (column): rays per m2 per probe (row).
-#include "indirect/path.glsl"
+#include "lib/math.glsl"
+#include "lib/random.glsl"
+#include "trace/rays.glsl"
+#include "indirect/direction_density.glsl"
 #include "indirect/probe.glsl"
 
 void main()

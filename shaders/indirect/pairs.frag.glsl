@@ -1,5 +1,6 @@
 // How densely the directions that one candidate of a group draws (row) fall on the next surface of another (column): per m2.
 #include "indirect/path.glsl"
+#include "indirect/direction_density.glsl"
 
 void main()
 {

@@ -1,0 +1,158 @@
+"""History: light of the pictures before, carried along while the view moves.
+
+Diffuse light, straight from sources and by way of surfaces, is carried without the surface's colour. A pixel asks
+where its surface was in the picture before, by the motion of the camera and of its object, and joins what that shows
+of the same surface with its own fresh light:
+
+    light = mix(before, fresh, 1 / (1 + n)),  n = samples that stand behind `before`, at most MANY
+
+so that n pictures of a still surface have the error of n samples. The same surface is one that lies on the tangent
+plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees). What was hidden before has no
+history: its light is the fresh one, which drafts filter over neighbours (film/neighbours.py). While objects move n is
+at most FEW, and light straight from sources is kept within the spread of what is fresh on 5x5 pixels, so that shadows
+move along. After any other edit there is no history at all (frame/history.py); what shines is never carried, since it
+moves otherwise than its surface.
+
+In drafts of the viewport, and, where `animation` says so, in final pictures drawn one after the other by one process;
+a picture then depends on those before it. Never in slices, with motion blur or where samples may end early: all
+machines would need the same past.
+
+| cost | per picture |
+|---|---|
+| pass | 16 + 4 fetches of history per pixel; 50 more while objects move |
+| images | 4 RGBA32F of the picture's size, kept |
+
+Bias: light that changes as things move lags by up to FEW pictures; sharp shadows of moved cameras are looked up
+between pixels. Bounded by the tests above. Sources: Nehab et al. 2007 (reverse reprojection); Schied et al. 2017
+(SVGF: light without colour, tests of surfaces); Salvi 2016 (bounds by the spread of neighbours).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..frame.history import Before
+from ..frame.picture import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique, Write
+from ..gfx import images, passes
+from ..scene.view import VIEW
+from ..snapshot.scene import Snapshot
+from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
+
+MANY, FEW = 32, 4  # samples that history counts for at most; while objects move
+PATHS = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
+REMEMBERED = (
+    Write("history.place", "RGBA32F", "Where the surface is from the render origin, m; alpha: samples of direct light"),
+    Write("history.facing", "RGBA32F", "Octahedral normal; z: samples of indirect light"),
+    Write("history.direct", "RGBA32F", "Diffuse direct light without the surface's colour"),
+    Write("history.indirect", "RGBA32F", "Diffuse indirect light without the surface's colour"),
+)
+RECALL = passes.fullscreen_program(
+    "history",
+    "history/recall.frag.glsl",
+    textures=(
+        *SURFACE_TEXTURES, ("RGBA32F", "fresh_direct"), ("RGBA32F", "fresh_indirect"), ("RGBA32F", "before_table"),
+        *(("RGBA32F", f"before_{write.name.partition('.')[2]}") for write in REMEMBERED),
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "many"), ("FLOAT", "few")),
+    outputs=tuple(
+        ("VEC4", f"out_{name}") for name in ("place", "facing", "direct", "indirect", "direct_light", "indirect_light")
+    ),
+)  # fmt: skip
+ROWS_OF_VIEW, ROWS_OF_OBJECT = 4, 6
+SLACK = 0.02  # of a box's longest side, by which it is larger than its object
+
+
+class History(Technique):
+    name = "history"
+    label = "History"
+    params = (
+        Param("drafts", "While the View Moves", True, "Carry light of the last pictures along in a moving viewport"),
+        Param(
+            "animation", "In Animations", False,
+            "Carry light along where one process renders several frames; each then depends on those before it",
+        ),
+    )  # fmt: skip
+    reads = SURFACES
+    finishes = PATHS
+    writes = (
+        *(Write(path, "RGBA32F", "Diffuse light, joined with that of the pictures before", True) for path in PATHS),
+        *REMEMBERED,
+    )
+    remembers = REMEMBERED
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if settings.draft:
+            return None if settings.get(self, "drafts") else "it is off for moving views"
+        if not settings.whole:
+            return "the picture is at rest"
+        if not settings.get(self, "animation"):
+            return "it is off in final pictures"
+        if settings.is_slice or settings.may_end_early:
+            return "other machines, or other runs, would have another past"
+        return "motion blur looks at several moments" if snapshot.motion is not None else None
+
+    def sample(self, frame: Frame) -> Iterator[None] | None:
+        if not frame.is_first:
+            return
+        before = frame.before
+        table = images.upload_list(_table(frame, before))
+        kept = before.images if before else {write.name: frame.images[PATHS[0]] for write in REMEMBERED}
+        with images.borrowed(*frame.size, "RGBA32F") as direct, images.borrowed(*frame.size, "RGBA32F") as indirect:
+            remembered = tuple(frame.images[write.name] for write in REMEMBERED)
+            passes.fullscreen(
+                RECALL,
+                images.Target((*remembered, direct.colors[0], indirect.colors[0])),
+                textures={
+                    **surface_bindings(frame), "fresh_direct": frame.images[PATHS[0]],
+                    "fresh_indirect": frame.images[PATHS[1]], "before_table": table,
+                    **{f"before_{name.partition('.')[2]}": image for name, image in kept.items()},
+                },
+                blocks={"film_view": frame.view_block},
+                constants={"many": float(MANY), "few": float(FEW)},
+            )  # fmt: skip
+            for path, found in zip(PATHS, (direct, indirect)):
+                passes.copy(found.colors[0], frame.target(path))
+        frame.count(self, "passes", 3)
+        if before:
+            frame.count(self, "pictures before", before.turn)
+            frame.count(self, "moved objects", len(before.moved))
+
+
+def _table(frame: Frame, before: Before | None) -> np.ndarray:
+    """(N, 4) what shaders/history/recall.frag.glsl reads; without a picture before, a view that sees nothing."""
+    if before is None:
+        return np.zeros((ROWS_OF_VIEW, 4))
+    origin = frame.geometry.origin
+    rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved))]
+    meshes = frame.snapshot.meshes
+    for one in frame.snapshot.instances:
+        if one.key not in before.moved:
+            continue
+        rows += [
+            *_between(before.moved[one.key], origin, before.origin),
+            *_into_box(one.matrix, meshes[one.mesh], origin),
+        ]
+    return np.array(rows, np.float64)
+
+
+def _between(matrix: np.ndarray, now: np.ndarray, then: np.ndarray) -> np.ndarray:
+    """(3, 4) rows of a matrix of the world, from places relative to the origin `now` to those relative to `then`."""
+    out = matrix[:3].copy()
+    out[:, 3] += matrix[:3, :3] @ now - then
+    return out
+
+
+def _into_box(matrix: np.ndarray, mesh, origin: np.ndarray) -> np.ndarray:
+    """(3, 4) rows that take a place relative to the origin into a mesh's box, which is -1..1 there."""
+    low, high = mesh.bounds_min, mesh.bounds_max
+    half = (high - low) / 2
+    half = half + SLACK * max(half.max(), 1e-6)
+    inverse = np.linalg.inv(matrix)[:3]
+    inverse = inverse / half[:, None]
+    inverse[:, 3] += inverse[:, :3] @ origin - (low + high) / 2 / half
+    return inverse

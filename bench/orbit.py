@@ -1,0 +1,180 @@
+"""Drafts of a moving view with history and without: `python -m bench orbit`.
+
+A camera goes around, an object moves, a lamp moves, or its power is edited in the middle; each for so many steps. Each
+step is one draft, as the viewport draws it (one sample, draft parameters), and is compared with its own converged
+picture: the same film, full parameters, many samples.
+
+    error           mean over steps of relMSE (bench/moving.py) on what is seen, ended at 1 for a pixel
+    fresh           the same where history holds nothing: what came into view, edges, what has moved away
+    after the edit  the same in the three steps after the lamp's edit
+    steps/s         by processor seconds, of all threads
+
+Both ways draw the same steps one after the other, the way without history with one seed, as a viewport does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bench.cells import ROOT
+from bench.markdown import put_between, table
+
+COMMAND = "python -m bench orbit"
+PAGE = ROOT / "docs" / "flicker.md"
+WAYS = ("camera", "object", "lamp", "edit")
+HEAD = ("scene", "what moves", "error without", "with history", "ratio", "fresh: without", "with", "steps/s", "with")
+MOST = 1.0  # error of a pixel that counts
+POINT = 1e-3  # pixels, half the width of a filter that does not spread
+AFTER = 3  # steps after an edit
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenes", nargs="+", default=["cornell_box"], help="sample files, or paths of .blend files")
+    parser.add_argument("--ways", nargs="+", default=list(WAYS), choices=WAYS)
+    parser.add_argument("--steps", type=int, default=48)
+    parser.add_argument("--size", default="96x72", help="pixels of the draft")
+    parser.add_argument("--truth", type=int, default=64, help="samples of a converged picture")
+    parser.add_argument("--page", action="store_true", help=f"write the table into docs/{PAGE.name}")
+
+
+def command(options: argparse.Namespace) -> int:
+    import addon
+
+    addon.register()
+    rows = [HEAD]
+    for scene in options.scenes:
+        for way in options.ways:
+            rows.append(row_of(scene, way, options))
+            print("  ".join(rows[-1]), flush=True)
+    print(table(rows))
+    if options.page:
+        put_between(PAGE, COMMAND, table(rows))
+    return 0
+
+
+def row_of(name: str, way: str, options: argparse.Namespace) -> tuple[str, ...]:
+    """A row of the table."""
+    import bpy
+
+    path = Path(name) if name.endswith(".blend") else ROOT / "sample_blends" / f"{name}.blend"
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    size = tuple(int(edge) for edge in options.size.split("x"))
+    steps = Steps(bpy.context.scene, way, options.steps, size)
+    truths = [steps.truth(number, options.truth) for number in range(options.steps)]
+    without, _, slow = steps.drawn(False)
+    with_history, fresh, quick = steps.drawn(True)
+    seen = [errors(shown, truth) for shown, truth in zip(without, truths)]
+    better = [errors(shown, truth) for shown, truth in zip(with_history, truths)]
+    counted = slice(options.steps // 2, options.steps // 2 + AFTER) if way == "edit" else slice(1, None)
+    before, after = (float(np.mean(found[counted])) for found in (seen, better))
+    new = [float(np.mean([e[m].mean() for e, m in zip(found[1:], fresh[1:]) if m.any()])) for found in (seen, better)]
+    return (
+        path.stem.replace("_", " "), "lamp's power, 3 steps after" if way == "edit" else way, f"{before:.4f}",
+        f"{after:.4f}", f"{after / before:.2f}", f"{new[0]:.4f}", f"{new[1]:.4f}", f"{slow:.2f}", f"{quick:.2f}",
+    )  # fmt: skip
+
+
+def errors(shown: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """(H, W) squared errors in units of what is seen, each at most MOST."""
+    luminance = truth.mean(axis=2)
+    squared = np.square(shown - truth).mean(axis=2) / (luminance**2 + (0.1 * luminance.mean()) ** 2)
+    return np.minimum(squared, MOST)
+
+
+class Steps:
+    """A scene that moves step by step, seen by drafts and by converged pictures."""
+
+    def __init__(self, scene, way: str, count: int, size: tuple[int, int]):
+        from addon.snapshot import SnapshotCache
+
+        self.scene, self.way, self.count, self.size = scene, way, count, size
+        self.cache = SnapshotCache()
+        self.camera = scene.camera.matrix_world.copy()
+        lamps = [one for one in scene.objects if one.type == "LIGHT"]
+        meshes = [one for one in scene.objects if one.type == "MESH" and len(one.data.polygons) > 1]
+        self.lamp = max(lamps, key=lambda one: one.data.energy, default=None)
+        inside = [one for one in meshes if max(one.dimensions) < 0.5 * max(max(m.dimensions) for m in meshes)]
+        self.thing = max(inside or meshes, key=lambda one: max(one.dimensions))
+        self.places = {one: one.matrix_world.copy() for one in (self.lamp, self.thing) if one is not None}
+        self.energy = self.lamp.data.energy if self.lamp else 0.0
+        self._truth = None
+
+    def snapshot(self, number: int):
+        """The scene at a step."""
+        import bpy
+        from mathutils import Matrix, Vector
+
+        from addon.snapshot import camera_of_scene, take
+
+        scene, turn = self.scene, 2.0 * np.pi * number / self.count
+        away = 0.6 * np.sin(turn)
+        thing_reach = 0.5 * max(self.thing.dimensions)
+        if self.way == "camera":  # around a point five metres before it
+            centre = self.camera @ Vector((0.0, 0.0, -5.0))
+            around = Matrix.Translation(centre) @ Matrix.Rotation(0.25 * away, 4, "Z") @ Matrix.Translation(-centre)
+            scene.camera.matrix_world = around @ self.camera
+        elif self.way == "object":
+            self.thing.matrix_world = Matrix.Translation((away * thing_reach, 0.0, 0.0)) @ self.places[self.thing]
+        elif self.way == "lamp" and self.lamp is not None:
+            self.lamp.matrix_world = Matrix.Translation((away, 0.0, 0.0)) @ self.places[self.lamp]
+        elif self.way == "edit" and self.lamp is not None:
+            self.lamp.data.energy = self.energy * (0.3 if number >= self.count // 2 else 1.0)
+            around = Matrix.Translation((0.01 * number, 0.0, 0.0))
+            scene.camera.matrix_world = around @ self.camera
+        bpy.context.view_layer.update()
+        graph = bpy.context.evaluated_depsgraph_get()
+        graph.update()
+        self.cache.doubt()
+        return take(graph, self.cache, *self.size, view=camera_of_scene(scene, graph, *self.size))
+
+    def settings(self, **changed):
+        """Of the viewport."""
+        from addon.ui.properties import settings_of
+
+        settings = settings_of(self.scene, viewport=True)
+        return replace(settings, **changed)
+
+    def truth(self, number: int, samples: int) -> np.ndarray:
+        """(H, W, 3) the converged picture of a step."""
+        from addon import techniques
+        from addon.frame.run import Renderer
+
+        self._truth = self._truth or Renderer(techniques.make_registry)
+        settings = self.settings(samples=samples, whole=True, seed=77, shows=frozenset())
+        snapshot = self.snapshot(number)
+        film = replace(snapshot.film, filter_width=POINT)  # drafts show what stands at the middle of each pixel
+        return _picture(self._truth, replace(snapshot, film=film), settings, samples)[..., :3]
+
+    def drawn(self, history: bool) -> tuple[list[np.ndarray], list[np.ndarray], float]:
+        """Drafts of all steps (H, W, 3), where each has no history (H, W), and steps a processor second."""
+        from addon import techniques
+        from addon.frame.run import Renderer
+        from addon.gfx import images
+
+        renderer = Renderer(techniques.make_registry)
+        settings = self.settings(samples=1, shows=frozenset()).as_draft()
+        settings = replace(settings, values={**settings.values, ("history", "drafts"): history})
+        shown, fresh, took = [], [], []
+        for number in range(self.count):
+            snapshot, started = self.snapshot(number), time.process_time()
+            shown.append(_picture(renderer, snapshot, settings, 1)[..., :3])
+            took.append(time.process_time() - started)
+            if history:
+                place = images.read(renderer.frame.images["history.place"])
+                fresh.append(place[..., 3] == 1.0)
+        renderer.release()
+        return shown, fresh, 1.0 / float(np.median(took))
+
+
+def _picture(renderer, snapshot, settings, samples: int) -> np.ndarray:
+    from addon.gfx import images
+
+    frame = renderer.begin(snapshot, settings)
+    while frame.samples_done < samples:
+        renderer.advance(frame)
+    return images.read(renderer.show(frame))

@@ -1,0 +1,169 @@
+// Light of the picture before, where that shows the same surface: joined with the fresh light of this sample.
+//
+// Both without the surface's colour. The picture before is looked up where the camera and the object were then, in four
+// pixels, of which those count that lie on the same surface: on its tangent plane, near the place, facing alike. `before_table`:
+// rows x, y, w of its view; its render origin from this one's, w: objects that have moved; six texels of each of those:
+// from where it is to where it was, and to its box, within -1..1.
+#include "lib/gbuffer.glsl"
+#include "neighbours/pixel_size.glsl"
+
+struct Found {
+  vec3 direct;
+  vec3 indirect;
+  vec2 counts;  // samples that stand behind both
+  float weight;
+};
+
+vec4 table(int texel)
+{
+  return before_table_fetch(ivec2(texel, 0));
+}
+
+vec3 moved_by(int row, vec3 position)
+{
+  vec4 p = vec4(position, 1.0);
+  return vec3(dot(table(row), p), dot(table(row + 1), p), dot(table(row + 2), p));
+}
+
+// What the picture before shows of a place, given as that had it.
+Found recall(vec3 position, vec3 normal, float tolerance)
+{
+  Found found;
+  found.direct = found.indirect = vec3(0.0);
+  found.counts = vec2(0.0);
+  found.weight = 0.0;
+  vec4 p = vec4(position, 1.0);
+  float w = dot(table(2), p);
+  if (w <= 0.0) {
+    return found;
+  }
+  ivec2 size = before_place_size();
+  vec2 place = (vec2(dot(table(0), p), dot(table(1), p)) / w * 0.5 + 0.5) * vec2(size) - 0.5;
+  if (any(lessThan(place, vec2(-1.0))) || any(greaterThan(place, vec2(size)))) {
+    return found;
+  }
+  ivec2 low = ivec2(floor(place));
+  vec2 share = place - vec2(low);
+  for (int k = 0; k < 4; k++) {
+    ivec2 pixel = low + ivec2(k & 1, k >> 1);
+    if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, size))) {
+      continue;
+    }
+    vec4 then = before_place_fetch(pixel);
+    vec4 facing = before_facing_fetch(pixel);
+    vec3 path = then.xyz - position;
+    bool same = then.w > 0.0 && dot(octahedral_decode(facing.xy), normal) > 0.9
+                && abs(dot(path, normal)) < tolerance && length(path) < 4.0 * tolerance;
+    if (same) {
+      vec2 sides = mix(1.0 - share, share, vec2(k & 1, k >> 1));
+      float weight = sides.x * sides.y;
+      found.direct += weight * before_direct_fetch(pixel).rgb;
+      found.indirect += weight * before_indirect_fetch(pixel).rgb;
+      found.counts += weight * vec2(then.w, facing.z);
+      found.weight += weight;
+    }
+  }
+  if (found.weight > 0.05) {
+    found.direct /= found.weight;
+    found.indirect /= found.weight;
+    found.counts /= found.weight;
+  }
+  else {
+    found.weight = 0.0;
+  }
+  return found;
+}
+
+// Light without the surface's colour; where it has none there is nothing to be divided.
+vec3 arriving(vec3 light, vec3 color)
+{
+  return vec3((color.r > 1e-3) ? light.r / color.r : 0.0, (color.g > 1e-3) ? light.g / color.g : 0.0,
+              (color.b > 1e-3) ? light.b / color.b : 0.0);
+}
+
+// The range of fresh light on the same surface nearby: what lies far beyond it is of before something moved.
+void nearby(ivec2 pixel, vec3 position, vec3 normal, float tolerance, out vec3 low, out vec3 high)
+{
+  vec3 sum = vec3(0.0);
+  vec3 squares = vec3(0.0);
+  float count = 0.0;
+  ivec2 size = surface_position_size();
+  for (int y = -2; y <= 2; y++) {
+    for (int x = -2; x <= 2; x++) {
+      ivec2 other = clamp(pixel + ivec2(x, y), ivec2(0), size - 1);
+      vec4 there = surface_position_fetch(other);
+      if (there.w != 0.0 && abs(dot(there.xyz - position, normal)) < 3.0 * tolerance) {
+        vec3 light = arriving(fresh_direct_fetch(other).rgb, surface_diffuse_fetch(other).rgb);
+        sum += light;
+        squares += light * light;
+        count += 1.0;
+      }
+    }
+  }
+  vec3 mean = sum / max(count, 1.0);
+  vec3 spread = sqrt(max(squares / max(count, 1.0) - mean * mean, vec3(0.0)));
+  low = mean - spread;
+  high = mean + spread;
+}
+
+vec3 reflected(vec3 light, vec3 color, vec3 fresh)
+{
+  return vec3((color.r > 1e-3) ? light.r * color.r : fresh.r, (color.g > 1e-3) ? light.g * color.g : fresh.g,
+              (color.b > 1e-3) ? light.b * color.b : fresh.b);
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 fresh_direct = fresh_direct_fetch(pixel);
+  vec4 fresh_indirect = fresh_indirect_fetch(pixel);
+  vec4 position = surface_position_fetch(pixel);
+  out_place = out_facing = out_direct = out_indirect = vec4(0.0);
+  out_direct_light = fresh_direct;
+  out_indirect_light = fresh_indirect;
+  vec3 color = surface_diffuse_fetch(pixel).rgb;
+  if (position.w == 0.0 || !(max_component(color) > 1e-3)) {
+    return;
+  }
+  vec3 normal = octahedral_decode(surface_normal_fetch(pixel).xy);
+  float tolerance = 1.5 * pixel_size_at(position.xyz);
+  vec3 shift = table(3).xyz;
+  Found found;
+  found.weight = 0.0;
+  int moved = int(table(3).w);
+  bool within = false;
+  for (int k = 0; k < moved && found.weight == 0.0; k++) {
+    int row = 4 + 6 * k;
+    vec3 inside = moved_by(row + 3, position.xyz);
+    if (max_component(abs(inside)) < 1.0) {
+      vec3 there = moved_by(row, position.xyz);
+      vec3 turned = safe_normalize(moved_by(row, position.xyz + normal * tolerance) - there);
+      found = recall(there, turned, tolerance);
+      within = true;
+    }
+  }
+  if (found.weight == 0.0) {
+    found = recall(position.xyz + shift, normal, tolerance);
+  }
+  vec3 direct = arriving(fresh_direct.rgb, color);
+  vec3 indirect = arriving(fresh_indirect.rgb, color);
+  vec2 counts = vec2(0.0);
+  if (found.weight > 0.0) {
+    counts = min(found.counts, (moved > 0) ? vec2(few, few) : vec2(many, many));
+    if (moved > 0) {
+      vec3 low;
+      vec3 high;
+      nearby(pixel, position.xyz, normal, tolerance, low, high);
+      found.direct = clamp(found.direct, low, high);
+    }
+    direct = mix(found.direct, direct, 1.0 / (1.0 + counts.x));
+    indirect = mix(found.indirect, indirect, 1.0 / (1.0 + counts.y));
+    out_direct_light.rgb = reflected(direct, color, fresh_direct.rgb);
+    out_indirect_light.rgb = reflected(indirect, color, fresh_indirect.rgb);
+  }
+  counts += 1.0;
+  out_place = vec4(position.xyz, counts.x);
+  out_facing = vec4(octahedral_encode(normal), counts.y, 0.0);
+  out_direct = vec4(direct, 0.0);
+  out_indirect = vec4(indirect, 0.0);
+}
