@@ -68,7 +68,10 @@ REFLECT = passes.fullscreen_program(
 
 
 def shown_alone(frame: Frame) -> bool:
-    """Whether this sample is a picture by itself, so that neighbours have to make up for missing samples."""
+    """Whether this sample is a picture by itself, so that neighbours have to make up for missing samples. With light of
+    pictures before (techniques/history.py) they do so once it is joined."""
+    if any(technique.remembers for technique in frame.plan.techniques):
+        return False
     return frame.is_first and (frame.settings.samples == 1 or frame.settings.draft)
 
 
@@ -96,6 +99,12 @@ def smooth(frame: Frame, technique: Technique, path: str) -> None:
         _mean(frame, MEAN_AGAIN, near.colors[0], far, APART)
         _reflect(frame, far.colors[0], path, "NONE")
     frame.count(technique, "filtered samples")
+
+
+def means(frame: Frame, arriving: images.Image, near: images.Target, far: images.Target) -> None:
+    """Means of `arriving` light over 4x4 and 13x13 pixels."""
+    _mean(frame, MEAN, arriving, near, 1)
+    _mean(frame, MEAN_AGAIN, near.colors[0], far, APART)
 
 
 @contextmanager

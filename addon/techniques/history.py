@@ -8,7 +8,8 @@ of the same surface with its own fresh light:
 
 so that n pictures of a still surface have the error of n samples. The same surface is one that lies on the tangent
 plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees). What was hidden before has no
-history: its light is the fresh one, which drafts filter over neighbours (film/neighbours.py). While objects move n is
+history: its light is the fresh one. Indirect light is filtered over neighbours (film/neighbours.py) when it is joined,
+not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. While objects move n is
 at most FEW, and light straight from sources is kept within the spread of what is fresh on 5x5 pixels, so that shadows
 move along. After any other edit there is no history at all (frame/history.py); what shines is never carried, since it
 moves otherwise than its surface.
@@ -33,6 +34,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..film import neighbours
 from ..frame.history import Before
 from ..frame.picture import Frame
 from ..frame.settings import Settings
@@ -42,7 +44,7 @@ from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 
-MANY, FEW = 32, 4  # samples that history counts for at most; while objects move
+MANY, FEW = 32, 8  # samples that history counts for at most; while objects move
 PATHS = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
 REMEMBERED = (
     Write("history.place", "RGBA32F", "Where the surface is from the render origin, m; alpha: samples of direct light"),
@@ -63,6 +65,15 @@ RECALL = passes.fullscreen_program(
         ("VEC4", f"out_{name}") for name in ("place", "facing", "direct", "indirect", "direct_light", "indirect_light")
     ),
 )  # fmt: skip
+SHOW = passes.fullscreen_program(
+    "history as it is shown",
+    "history/show.frag.glsl",
+    textures=tuple(
+        ("RGBA32F", name)
+        for name in ("surface_diffuse", "fresh_indirect", "before_facing", "before_indirect", "nearer", "farther")
+    ),
+    outputs=(("VEC4", "out_light"),),
+)
 ROWS_OF_VIEW, ROWS_OF_OBJECT = 4, 6
 SLACK = 0.02  # of a box's longest side, by which it is larger than its object
 
@@ -115,12 +126,27 @@ class History(Technique):
                 blocks={"film_view": frame.view_block},
                 constants={"many": float(MANY), "few": float(FEW)},
             )  # fmt: skip
+            if frame.settings.samples == 1 or frame.settings.draft:
+                self._filtered(frame, indirect)
             for path, found in zip(PATHS, (direct, indirect)):
                 passes.copy(found.colors[0], frame.target(path))
         frame.count(self, "passes", 3)
         if before:
             frame.count(self, "pictures before", before.turn)
             frame.count(self, "moved objects", len(before.moved))
+
+    def _filtered(self, frame: Frame, shown: images.Target) -> None:
+        """Indirect light of neighbours where few pictures stand behind it."""
+        light, surfaces = frame.images["history.indirect"], surface_bindings(frame)
+        with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
+            neighbours.means(frame, light, near, far)
+            textures = {
+                "surface_diffuse": surfaces["surface_diffuse"], "fresh_indirect": frame.images[PATHS[1]],
+                "before_facing": frame.images["history.facing"], "before_indirect": light,
+                "nearer": near.colors[0], "farther": far.colors[0],
+            }  # fmt: skip
+            passes.fullscreen(SHOW, shown, textures=textures)
+        frame.count(self, "passes", 3)
 
 
 def _table(frame: Frame, before: Before | None) -> np.ndarray:

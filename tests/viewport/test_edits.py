@@ -61,6 +61,7 @@ def redden():
 def test_draft_after_an_edit_is_that_of_a_new_viewport(scene, region, edit):
     """Its rays search a tree that was refitted, its maps and the means of its materials are partly kept."""
     scene.candela.bounces = 2
+    scene.candela.history_drafts = False  # it would join what is compared here with the picture before
     for k in range(4):
         bpy.ops.mesh.primitive_torus_add(location=(k - 1.5, -1.5, 0.5), major_segments=12, minor_segments=6)
     for name in ("Plane", "Cube", "Torus"):
