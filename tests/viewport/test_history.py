@@ -1,0 +1,118 @@
+"""What a moving view remembers: less noise, nothing of another light, and a picture at rest as without."""
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import techniques
+from addon.frame import history
+from addon.frame.run import Renderer
+from addon.gfx import images
+from addon.lighting import probes
+from addon.snapshot import SnapshotCache, camera_of_scene, take
+from addon.techniques.history import _between, _into_box
+from addon.ui.properties import settings_of
+from tests.viewport.region import Region
+
+SIZE = (32, 24)
+
+
+@pytest.fixture
+def drafts(scene):
+    """Draws a draft of the scene as it is; returns the frame."""
+    renderer, cache = Renderer(techniques.make_registry), SnapshotCache()
+
+    def draw(moved=0.0, **changed):
+        graph = bpy.context.evaluated_depsgraph_get()
+        graph.update()
+        cache.doubt()
+        camera = camera_of_scene(scene, graph, *SIZE)
+        matrix = camera.matrix.copy()
+        matrix[:3, 3] += moved * matrix[:3, 0]
+        snapshot = take(graph, cache, *SIZE, view=replace(camera, matrix=matrix))
+        settings = replace(settings_of(scene, viewport=True), samples=1, bounces=1, **changed).as_draft()
+        frame = renderer.begin(snapshot, settings)
+        renderer.advance(frame)
+        return frame
+
+    yield draw
+    renderer.release()
+
+
+def samples_behind(frame):
+    """(H, W) pictures that stand behind indirect light; 0 where nothing is seen."""
+    return images.read(frame.images["history.facing"])[..., 2]
+
+
+def test_pictures_of_a_moving_view_add_up(drafts):
+    for k in range(4):
+        frame = drafts(moved=0.01 * k)
+    counts = samples_behind(frame)
+    assert frame.before.turn == 3
+    assert np.median(counts[counts > 0]) == pytest.approx(4.0, abs=0.1)
+    assert len({history.seeded(frame.settings, replace(frame.before, turn=k)).seed for k in range(1, 9)}) == 8
+
+
+def test_an_edit_of_a_lamp_gives_history_up(scene, drafts):
+    drafts()
+    drafts(moved=0.01)
+    next(one for one in scene.objects if one.type == "LIGHT").data.energy *= 2
+    frame = drafts(moved=0.02)
+    assert frame.before is None and samples_behind(frame).max() == 1.0
+
+
+def test_history_moves_with_an_object(drafts):
+    """A cube that goes along with the camera keeps what it had; where it was is new."""
+    drafts()
+    bpy.data.objects["Cube"].location.x += 0.4
+    frame = drafts()
+    counts = samples_behind(frame)
+    assert list(frame.before.moved) and 0.02 < (counts == 1.0).mean() < 0.4
+    assert (counts == 2.0).mean() > 0.3
+
+
+def test_picture_at_rest_is_as_without_history(scene, region):
+    pictures = []
+    for k in range(3):
+        region.draw(region.moved(0.02 * k))
+    region.camera = region.moved(0.04)
+    pictures.append(region.rest())
+    scene.candela.history_drafts = False
+    other = Region()
+    other.camera = region.camera
+    pictures.append(other.rest())
+    other.viewport.release()
+    np.testing.assert_array_equal(*pictures)
+
+
+def test_matrices_take_places_to_where_they_were():
+    """Closed form: a turn by 90 degrees about z and a step of 2 m, seen from two origins."""
+    turned = np.array([[0.0, -1.0, 0.0, 2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    rows = _between(turned, np.array([10.0, 0.0, 0.0]), np.array([0.0, 5.0, 0.0]))
+    np.testing.assert_allclose(rows @ (1.0, 0.0, 3.0, 1.0), (2.0, 11.0 - 5.0, 3.0))
+
+    class Box:
+        bounds_min, bounds_max = np.array([-1.0, -1.0, 0.0]), np.array([3.0, 1.0, 2.0])
+
+    inside = _into_box(turned, Box, np.zeros(3)) @ (*(turned @ (1.0, 0.0, 1.0, 1.0))[:3], 1.0)
+    np.testing.assert_allclose(inside, 0.0, atol=1e-12)
+    edge = _into_box(turned, Box, np.zeros(3)) @ (*(turned @ (3.0, 0.0, 1.0, 1.0))[:3], 1.0)
+    assert 0.9 < edge[0] < 1.0  # the box is a little larger than its object
+
+
+def test_cameras_side_by_side_have_the_same_probes(drafts, monkeypatch):
+    """They stand in cells of space: one that moves by a tenth of a probe's share of the picture keeps most of them."""
+    found, find = [], probes.find
+    monkeypatch.setattr(probes, "find", lambda *a: found.append(find(*a)) or found[-1])
+    places = []
+    for k in range(2):
+        drafts(moved=0.03 * k, values={("history", "drafts"): False})  # with it each picture has a seed of its own
+        row = images.read(found[-1]["probe_places"])[0]
+        places.append({int(one[3]): one[:3] for one in row if one[3] > 0})
+    first, second = places
+    common = set(first) & set(second)
+    assert len(first) > 20 and len(common) > 0.6 * len(first)
+    apart = [np.linalg.norm(first[one] - second[one]) for one in common]
+    assert np.median(apart) < 0.05
