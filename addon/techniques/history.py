@@ -97,6 +97,8 @@ class History(Technique):
     remembers = REMEMBERED
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if snapshot.camera is not None and snapshot.camera.panorama is not None:
+            return "places are not looked up in pictures of panoramic cameras"
         if settings.draft:
             return None if settings.get(self, "drafts") else "it is off for moving views"
         if not settings.whole:
