@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 import addon
-from addon.gfx.interface import answered
+from addon.gfx.interface import answered, asked_by
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
 from addon.lighting.grass import GRASS
+from addon.lighting.leaving_light import LEAVES
 from addon.lighting.linked import LINKS
 from addon.lighting.loop import lighting
 from addon.lighting.visibility import HARD
@@ -80,6 +81,7 @@ def programs() -> list[Program]:
     made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
     made += [grass_program(materials._surface_program(plain)), answered(lighting(HARD, False), (GRASS,))]
     made += [answered(lighting(HARD, False), (LINKS,))]
+    made += [answered(next(one for one in made if LEAVES.asked in asked_by(one)), (LEAVES,))]
     made += relief_programs()
     layouts = ((("UV", "VECTOR"),), (("", "COLOR"), ("", "VALUE")))
     made += [lamp_program(plain), *(materials._aov_program(plain, (held,)) for held in layouts)]
