@@ -27,6 +27,9 @@ _TABS = {
     OBJECT: ("object", "object"),
 }
 
+OFF = {"NONE", "OFF", "BUMP"}  # items of a technique's first parameter that leave the others nothing to do
+SWITCHED_BY = {"eye": "glare_mode"}  # techniques of a camera that another one's parameter asks for
+DISPLACES = "relief"  # the technique whose panel shows Blender's own choice of what displacement moves
 _WITH_SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "VOLUME"}  # kinds of object
 
 
@@ -39,6 +42,16 @@ def scoped(technique) -> dict[str, list[Param]]:
     return found
 
 
+def is_off(block, technique, switch: Param) -> bool:
+    """Whether the first of a technique's parameters of a data-block says that the others have nothing to say."""
+    if technique.name in SWITCHED_BY:
+        return getattr(block.candela, SWITCHED_BY[technique.name]) in OFF
+    value = getattr(block.candela, identifier(technique.name, switch.name)) if switch.items else None
+    if technique.name == DISPLACES and value == "AUTO":
+        return block.displacement_method == "BUMP"
+    return value in OFF
+
+
 def _panel(technique, scope: str, params: list[Param]) -> type:
     tab, name = _TABS[scope]
 
@@ -48,13 +61,21 @@ def _panel(technique, scope: str, params: list[Param]) -> type:
         return context.engine == ENGINE and block is not None and (scope != OBJECT or block.type in _WITH_SURFACES)
 
     def draw(self, context):
-        group = getattr(context, name).candela
-        self.layout.use_property_split = True
-        for param in params:
+        block = getattr(context, name)
+        group, column = block.candela, self.layout
+        column.use_property_split = True
+        if scope == MATERIAL and technique.name == DISPLACES:
+            column.prop(block, "displacement_method", text="Displacement Method")
+        column = self.layout.column()
+        column.active = technique.name not in SWITCHED_BY or not is_off(block, technique, params[0])
+        for number, param in enumerate(params):
             if param.many:
-                _draw_list(self.layout, group, technique, scope, param)
+                _draw_list(column, group, technique, scope, param)
             else:
-                self.layout.prop(group, identifier(technique.name, param.name))
+                column.prop(group, identifier(technique.name, param.name))
+            if number == 0 and is_off(block, technique, param):
+                column = self.layout.column()
+                column.active = False
 
     body = {
         "__doc__": f"Settings of {technique.label} for this {scope.lower()}",

@@ -12,7 +12,7 @@ from addon.frame.technique import SCENE, identifier
 from addon.snapshot.scene import Note
 from addon.techniques import REGISTRY
 from addon.techniques.denoise import Denoise
-from addon.ui import ENGINE, blender_panels, notes, panels, technique_groups
+from addon.ui import ENGINE, blender_panels, notes, panels, scoped_panels, technique_groups
 from addon.ui.pass_tree import TREE
 from addon.ui.passes import PASSES, wanted_passes
 from addon.ui.properties import _SMALL as SMALL
@@ -434,3 +434,19 @@ def test_another_file_clears_the_last_picture(scene, published):
     published(ledger.Ledger([], {}, samples=4))
     engine._another_file()
     assert ledger.latest() is None
+
+
+def test_what_is_off_leaves_its_other_fields_grey_and_displacement_has_its_method(scene):
+    material, camera = bpy.data.materials.new("Grass"), bpy.data.cameras.new("Eye")
+    by_name = {technique.name: technique for technique in REGISTRY}
+
+    def is_off(block, name):
+        scope = "MATERIAL" if block is material else "CAMERA"
+        technique = by_name[name]
+        return scoped_panels.is_off(block, technique, scoped_panels.scoped(technique)[scope][0])
+
+    assert is_off(material, "grass") and is_off(camera, "eye") and is_off(material, "relief")
+    material.candela.grass_patch, material.displacement_method = "MEADOW", "BOTH"
+    camera.candela.glare_mode = "CONVOLUTION"
+    assert not (is_off(material, "grass") or is_off(camera, "eye") or is_off(material, "relief"))
+    assert "displacement_method" in drawn(bpy.types.CANDELA_MATERIAL_PT_relief, material=material)
