@@ -84,7 +84,9 @@ class Frame:
     find_receivers: Callable[[], Receivers] | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
-    shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
+    shown: dict[str, str] = field(
+        default_factory=dict
+    )  # of a sum of samples: the image, a sum as well, that is shown instead
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
     needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`

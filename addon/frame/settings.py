@@ -46,7 +46,7 @@ MOTION_STEPS = Param(
     "Moments at which a final render with motion blur looks at the scene, at most one for each sample", 1, 256,
 )  # fmt: skip
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD, MOTION_STEPS)
-PARTIAL = (SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD)  # by which a picture has other samples than all
+PARTIAL = (SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD)  # those that leave samples out
 AUTO = "AUTO"
 OFF = "OFF"  # a slot that nothing fills
 

@@ -81,7 +81,7 @@ class CompiledMaterial:
     aovs: tuple[
         tuple[str, str], ...
     ] = ()  # name, kind: of the k-th one `glsl` has `material_aov{k}(SurfacePoint point)`
-    along_normal: bool = False  # by a height: what it lifts, it lifts along the normal
+    along_normal: bool = False  # displacement is a height along the normal, not a vector
     averaging: frozenset[str] = frozenset()  # those of `images` of which some lookup averages (averages.py)
     own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # about what it reflects, on average: for first looks
