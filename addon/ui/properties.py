@@ -40,7 +40,7 @@ from .pass_tree import TREE, order_of
 
 _VECTOR_OF_HANDLE = {POINT: "TRANSLATION", DIRECTION: "DIRECTION"}
 OFF_NUMBER = 255  # of the item in slots' menus, beyond all techniques
-PREVIEW_SAMPLES = 8  # of material icons, which are drafts
+PREVIEW_SAMPLES = 4  # of material icons, which are drafts
 
 
 def _redraw(group, context) -> None:
