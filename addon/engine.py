@@ -39,6 +39,9 @@ MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and 
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 STEREO = ("left", "right")
+NO_CONTEXT_YET = (
+    "Blender before 5.2 opens the GPU by a render, which would end a bake: render any picture first, then bake again."
+)
 CATCHERS_WHOLE = "A picture with shadow catchers cannot be rendered in slices: render it whole."
 
 
@@ -327,6 +330,8 @@ class CandelaEngine(bpy.types.RenderEngine):
             self._fail_unforeseen(error)
 
     def _baked(self, depsgraph, thing, kind: str, what: int, result, width: int, height: int) -> np.ndarray:
+        if bpy.app.background and context.opens_by_a_render():
+            raise ValueError(NO_CONTEXT_YET)
         scene, shared = depsgraph.scene, session(depsgraph.scene, "bake")
         from_camera = scene.render.bake.view_from == "ACTIVE_CAMERA" and scene.camera is not None
         view = None if from_camera else seen_by_nobody()

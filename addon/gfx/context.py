@@ -104,6 +104,11 @@ def ensure() -> None:
         raise RuntimeError("Candela found no GPU context: this Blender was started without OpenGL, Vulkan or Metal.")
 
 
+def opens_by_a_render() -> bool:
+    """Whether `ensure` would have to render something first, which ends what Blender is at."""
+    return not available() and not hasattr(gpu, "init")
+
+
 def describe() -> str:
     """Renderer, driver and backend in one line, for reports."""
     backend = gpu.platform.backend_type_get()

@@ -4,8 +4,17 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.gfx import context
+
+pytestmark = pytest.mark.usefixtures("opened")
 LIGHT = {"DIRECT", "INDIRECT"}
 SIDE = 12
+
+
+@pytest.fixture
+def opened():
+    """The GPU's context, which Blender before 5.2 does not open in a bake."""
+    context.ensure()
 
 
 @pytest.fixture
