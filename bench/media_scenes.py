@@ -183,6 +183,56 @@ def foggy_world() -> None:
     box((-5, -5, 0.01), (5, 5, 2.5), volume(Density=0.15, Color=(0.9, 0.9, 0.9, 1)))
 
 
+def blinds() -> None:
+    """The sun between the slats of a window."""
+    wall = diffuse(0.7, 0.65, 0.6)
+    floor()
+    box((-3, 2, 0), (3, 2.2, 3.2), wall)
+    box((-3, -3, 3), (3, 2, 3.2), wall)
+    for y, z in (((-3, 2), (0, 0.8)), ((-3, 2), (2.4, 3.2)), ((-3, -1.5), (0.8, 2.4)), ((1, 2), (0.8, 2.4))):
+        box((-3.2, y[0], z[0]), (-3, y[1], z[1]), wall)
+    for k in range(8):
+        box((-3.12, -1.5, 0.8 + 0.2 * k), (-3.08, 1, 0.9 + 0.2 * k), wall)
+    lamp("SUN", (0, 0, 5), 15, (0, -1.1, 0), angle=0.01)
+    box((-2.99, -2.9, 0.01), (3, 1.99, 2.99), volume(Density=0.1, Color=(0.95, 0.95, 0.95, 1)))
+
+
+def headlights() -> None:
+    """Two narrow spots that shine past a post in a foggy night."""
+    floor(0.3, 12.0)
+    for x in (-0.7, 0.7):
+        lamp("SPOT", (x, 5, 0.8), 400, (np.pi / 2 - 0.05, 0, np.pi + 0.15), spot_size=0.5, shadow_soft_size=0.06)
+    box((0.1, 2.5, 0), (0.3, 2.7, 1.6), diffuse(0.5, 0.5, 0.5))
+    world_medium(Density=0.05, Color=(0.9, 0.9, 0.9, 1), Anisotropy=0.5)
+
+
+def thin_smoke() -> None:
+    """Smoke of sharp noise before a wall, lit from the side."""
+    floor()
+    box((-3, 2, 0), (3, 2.2, 4), diffuse(0.5, 0.5, 0.55))
+    lamp("AREA", (-2.5, -1, 2.5), 250, (0, -0.9, 0), size=0.6)
+    made = volume("ShaderNodeVolumePrincipled", Color=(0.7, 0.7, 0.7, 1))
+    noise_density(made, 3.0, 0.5, 20.0)
+    box((-1.0, -0.8, 0.02), (1.0, 0.8, 2.8), made)
+
+
+def spot_through_glass() -> None:
+    floor()
+    box((-2, -2, 0.01), (2, 2, 3.6), volume(Density=0.15, Color=(0.9, 0.9, 0.9, 1)))
+    _ball(0.5, material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0), (0, 0, 1.8))
+    lamp("SPOT", (0, 0, 3.5), 300, spot_size=0.7, shadow_soft_size=0.05)
+
+
+def camera_inside() -> None:
+    """In a cave of thick fog, with a lamp and a box before the eye."""
+    wall = diffuse(0.5, 0.45, 0.4)
+    floor()
+    box((-3, 3, 0), (3, 3.2, 3.2), wall)
+    box((0.4, 0.2, 0), (1.0, 0.8, 1.4), diffuse(0.2, 0.4, 0.7))
+    lamp("POINT", (-0.8, 0.5, 2.0), 200, shadow_soft_size=0.15)
+    box((-6, -8, -0.1), (6, 4, 4), volume(Density=0.2, Color=(0.85, 0.9, 0.95, 1), Anisotropy=0.2))
+
+
 def _ball(radius: float, shade, location) -> None:
     bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=radius, location=location)
     made = bpy.context.object
@@ -277,6 +327,12 @@ def waves(side: int = 96) -> None:
 MEDIA = {
     "spot in fog": spot_in_fog, "window in haze": window_in_haze, "procedural smoke": procedural_smoke,
     "VDB cloud": vdb_cloud, "nested boxes": nested_boxes, "fire": fire, "foggy world": foggy_world,
+}  # fmt: skip
+# Scenes of the page, with the scatterings before the one towards the eye: none in a new file, some for what is white.
+ROOMS = {
+    "window in haze": (window_in_haze, 0), "blinds": (blinds, 0), "headlights": (headlights, 0),
+    "VDB cloud": (vdb_cloud, 4), "smoke": (thin_smoke, 0), "fire": (fire, 0),
+    "spot through glass": (spot_through_glass, 0), "foggy world": (foggy_world, 0), "camera inside": (camera_inside, 4),
 }  # fmt: skip
 CAUSTICS = {
     "W1 glass ball": glass_ball, "W2 metal ring": metal_ring, "W3 g = .7": glass_ball_forward,

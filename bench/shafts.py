@@ -147,10 +147,10 @@ def page(pictures=None, with_costs: bool = False) -> str:
             rows.append((name if rays == RAYS[0] else "", f"{rays}²", f"{100 * error:.1f}", f"{energy:.3f}"))
             print(*rows[-1], sep="  ", flush=True)
         if pictures is not None:
-            from bench.media import _save
+            from bench.cases import write_pictures
 
             both = (np.repeat(image[..., None], 3, axis=2) for image in (shown, expected))
-            _save(pictures / f"shaft {name}.png".replace(" ", "_"), *both)
+            write_pictures(pictures, f"shaft {name}".replace(" ", "_"), *both)
     text = f"{SIZE} x {SIZE} pixels, {SAMPLES} samples, beams alone.\n\n{markdown.table(rows)}"
     return text + costs() if with_costs else text
 

@@ -6,21 +6,24 @@ each stretch that then lies in a medium is drawn as a quad on the screen. At a p
     L = flux * sigma_s(x) p(x) T(start, x) T(x, eye) * k(u) / sin(gamma)
 
 with u the distance between the two lines, gamma their angle, and k a tent of area one whose half width is the beam's
-own (half the distance to the next ray) or `BEAM_PIXELS`, whichever is more. The weight is that of a photon beam with a
-one-dimensional kernel: neither rays nor pixels change the sum. Rays take other places in their texels in each sample.
+own (half the distance to the next ray) or `BEAM_PIXELS`, whichever is more. What smooth glass mirrors is few rays that
+bulging sides send apart: their kernels are wider, and grow on their way by the curvature (ray cones). The weight is
+that of a photon beam with a one-dimensional kernel: neither rays nor pixels change the sum. Rays take other places in
+their texels in each sample.
 
 Airlight's shadow rays take glass for opaque where this runs, so that no light arrives twice.
 
 | cost | per sample and lamp |
 |---|---|
-| rays | `rays` squared, up to 10 interfaces each |
+| rays | as many as their beams need side by side, at most `rays` squared, up to 10 interfaces each |
 | quads | 2 per ray, empty ones clipped; fragments: as long as beams are on screen, times their width |
 | memory | 96 bytes per ray |
 
 Sources: Hu, Dong, Ihrke, Grosch, Yuan, Seidel, "Interactive Volume Caustics in Single-Scattering Media", I3D 2010;
 Jarosz, Nowrouzezahrai, Sadeghi, Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon Points
 and Beams", TOG 2011 (weight). Changed: rays by the hierarchy instead of depth maps, so that several bounces and concave
-objects are right; quads with the normalised weight instead of lines.
+objects are right; quads with the normalised weight instead of lines; cones of Akenine-Möller, Crassin, Boksansky,
+Belcour, Panteleev, Wright, "Improved Shader and Texture Level of Detail Using Ray Cones", JCGT 2021.
 
 Bias: the kernel's width; a beam seen nearly end-on is bounded (sine of 1/20). Rough glass and mirrors are taken as
 smooth up to SMOOTH and left out beyond. Materials count by their mean colour. The world and shining meshes throw no
@@ -51,7 +54,9 @@ from ..sources import lights
 from .airlight import may_send, volume_graphs
 
 SMOOTH = 0.2  # roughness
-BEAM_PIXELS, MOST_PIXELS = 1.5, 8.0  # half widths of beams on the screen
+# Half widths of beams on the screen. Tents of one pixel add up to the same wherever among pixels a beam runs, as those
+# of one and a half do not: at the waist of a ball lens, between two columns of pixels, two per cent were missing.
+BEAM_PIXELS, MOST_PIXELS = 1.0, 8.0
 MOST_LAMPS = 8  # in a sample
 GLASS, MIRROR = 1.0, 2.0
 STRETCHES = 2
@@ -62,7 +67,7 @@ TRACE = passes.fullscreen_program(
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
     constants=(
         ("INT", "light_number"), ("INT", "ray_side"), ("VEC2", "beam_jitter"), ("VEC4", "casters"),
-        ("FLOAT", "scene_size"), ("FLOAT", "offset_size"),
+        ("FLOAT", "scene_size"), ("FLOAT", "offset_size"), ("FLOAT", "closer"),
     ),
     outputs=tuple(("VEC4", f"out_{name}{k}") for k in range(STRETCHES) for name in ("start", "end", "flux")),
 )  # fmt: skip
@@ -80,7 +85,12 @@ BEAMS = Program(
     constants=(("INT", "ray_side"), ("FLOAT", "beam_pixels"), ("FLOAT", "beam_most_pixels")),
     outputs=(("VEC4", "out_volume"),),
 )  # fmt: skip
-MOST_RAYS = 4  # along each side of the grid, for each pixel along the longer side: more fall on the same pixels
+# Rays of a picture of one sample for each pixel of the width of what bends them: their beams lie side by side across
+# it, each several pixels wide, however many start at the same place of it. With more samples all have more, and each
+# fewer.
+RAYS_A_PIXEL = 256
+LEAST_SIDE = 8
+MOST_VERTICES = 50_000  # of all that bends light: beyond, corners of boxes stand for them
 
 
 class VolumeCaustics(Technique):
@@ -89,8 +99,8 @@ class VolumeCaustics(Technique):
     params = (
         Param(
             "rays", "Rays", 192,
-            "Light rays along each side of the grid that each lamp sends to glass and mirrors in a sample, at most "
-            "four for each pixel along the picture's longer side",
+            "Light rays along each side of the grid that each lamp sends to glass and mirrors in a sample, fewer where "
+            "these are small in the picture",
             8, 1024, draft=64,
         ),
     )  # fmt: skip
@@ -135,12 +145,14 @@ class VolumeCaustics(Technique):
         media = frame.service(MediaService)
         if media is None or not self._emitters or not media.media.scatters:
             return
-        side = min(frame.settings.get(self, "rays"), MOST_RAYS * max(frame.size))
+        centre, radius = self._casters
+        each = RAYS_A_PIXEL / np.sqrt(frame.settings.samples)
+        enough = int(np.ceil(np.sqrt(each * pixels_across(frame, centre, radius))))
+        side = min(frame.settings.get(self, "rays"), max(enough, LEAST_SIDE))
         chosen, weight = lights.spread_choice(len(self._emitters), MOST_LAMPS, frame.uniform("beams/choose"))
         turn = [self._emitters[k] for k in chosen]
         drawn = [one.sample(*frame.random_volume("beams/light")) for one in turn]
         sources = self._sources.set([e.row(point, 0, 1, weight) for e, point in zip(turn, drawn)])
-        centre, radius = self._casters
         traced = [images.pool.take(side, side, "RGBA32F") for _ in range(3 * STRETCHES)]
         surfaces = {"surface_position": frame.images["surface.position"]}
         for number in range(len(turn)):
@@ -152,7 +164,7 @@ class VolumeCaustics(Technique):
                 constants={
                     "light_number": number, "ray_side": side, "beam_jitter": frame.random("beams/place"),
                     "casters": (*centre, radius), "scene_size": max(frame.geometry.size, 2 * radius),
-                    "offset_size": frame.offset_size,
+                    "offset_size": frame.offset_size, "closer": frame.settings.samples**-0.5,
                 },
             )  # fmt: skip
             yield
@@ -181,6 +193,16 @@ class VolumeCaustics(Technique):
         self._sources.release()
         self._table = None
         self._emitters = []
+
+
+def pixels_across(frame: Frame, centre: np.ndarray, radius: float) -> float:
+    """How wide a sphere is in the picture, at most as wide as from its surface."""
+    camera = frame.snapshot.camera
+    left, right = camera.frame[:2]
+    away = 1.0
+    if camera.kind != "ORTHOGRAPHIC":
+        away = max(float(np.linalg.norm(centre + frame.geometry.origin - camera.matrix[:3, 3])), radius)
+    return 2.0 * radius / away * frame.size[0] / max(abs(right - left), 1e-20)
 
 
 _MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
@@ -222,13 +244,17 @@ def _row(material, graph: Graph) -> tuple:
 
 def casters_of(snapshot: Snapshot, bending: set[int], origin: np.ndarray) -> tuple[np.ndarray, float] | None:
     """Centre, relative to the origin, and radius of a sphere around all that bends light."""
+    chosen = [
+        one for one in snapshot.instances
+        if not bending.isdisjoint(one.materials) and snapshot.meshes[one.mesh].triangle_count and one.visibility.volume
+    ]  # fmt: skip
+    few = sum(len(snapshot.meshes[one.mesh].positions) for one in chosen) <= MOST_VERTICES
     places = []
-    for one in snapshot.instances:
+    for one in chosen:
         mesh = snapshot.meshes[one.mesh]
-        if bending.isdisjoint(one.materials) or not mesh.triangle_count or not one.visibility.volume:
-            continue
         low, high = np.asarray(mesh.bounds_min), np.asarray(mesh.bounds_max)
         corners = np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+        corners = np.asarray(mesh.positions, float) if few else corners
         places.append(corners @ one.matrix[:3, :3].T + one.matrix[:3, 3] - origin)
     if not places:
         return None

@@ -6,6 +6,7 @@
 #include "ask/view.glsl"
 #include "media/bins.glsl"
 #include "media/view_ray.glsl"
+#include "media/beam_width.glsl"
 
 #define LEAST_SINE 0.05
 
@@ -33,7 +34,7 @@ void main()
   float off = length(position - ray.origin - along_view * ray.direction);
   float pixel_size = abs(view_pixel());
   pixel_size *= view_is_parallel(film_view.eye) ? 1.0 : (ray.before + along_view) * max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
-  float wide = clamp(beam_flux.w, beam_pixels * pixel_size, beam_most_pixels * pixel_size);
+  float wide = beam_half_width(along_beam, pixel_size);
   float tent = max(1.0 - off / wide, 0.0) / wide;
   if (!(tent > 0.0)) {
     discard;
@@ -46,7 +47,7 @@ void main()
   if (!(max_component(scattered) > 0.0)) {
     discard;
   }
-  vec3 passing = media_transmittance(position, -ray.direction, along_view, seed)
+  vec3 passing = media_transmittance_known(position, -ray.direction, along_view, seed)
                  * media_transmittance(beam_start.xyz, direction, along_beam, seed + 1u);
   vec3 light = beam_flux.rgb * scattered * passing * (tent / max(sqrt(sine_squared), LEAST_SINE));
   out_volume = vec4((is_finite(light.x) && is_finite(light.y) && is_finite(light.z)) ? light : vec3(0.0), 0.0);

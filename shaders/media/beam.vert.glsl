@@ -1,5 +1,7 @@
 // A stretch of a light ray as a quad on the screen, wide enough for its kernel. Empty ones are clipped.
 #include "ask/view.glsl"
+#include "media/beam_width.glsl"
+
 vec4 beam_clip(vec3 position)
 {
   vec4 place = vec4(position, 1.0);
@@ -28,10 +30,16 @@ void main()
       float length_ = length(along);
       vec2 unit = (length_ > 1e-6) ? along / length_ : vec2(1.0, 0.0);
       vec2 across = vec2(-unit.y, unit.x);
-      // Half a pixel more than the kernel; the wider end of the beam for both.
-      float scale = 0.5 * pixels.x / max(abs(film_view.frame.y - film_view.frame.x) * 0.5, 1e-20);
-      float nearest = view_is_parallel(film_view.eye) ? 1.0 : max(min(first.w, last.w), 1e-6);
-      float wide = min(max(beam_pixels, beam_flux.w * scale / nearest), beam_most_pixels) + 1.0;
+      // Half a pixel more than the kernel. A beam that spreads is a trapezoid; of others the wider end counts for both.
+      float scale = pixels.x / max(abs(film_view.frame.y - film_view.frame.x), 1e-20);
+      bool parallel = view_is_parallel(film_view.eye);
+      float reach = length(beam_end.xyz - beam_start.xyz);
+      float from = (a.w < near) ? (near - a.w) / (b.w - a.w) : 0.0;
+      float to = (b.w < near) ? 1.0 - (near - b.w) / (a.w - b.w) : 1.0;
+      float nearest = parallel ? 1.0 : max(min(first.w, last.w), 1e-6);
+      float own = parallel ? 1.0 : max((corner.x < 0.0) ? first.w : last.w, 1e-6);
+      float size = ((beam_end.w > 0.0) ? own : nearest) / scale;
+      float wide = beam_half_width(((corner.x < 0.0) ? from : to) * reach, size) / size + 1.0;
       vec2 place = (corner.x < 0.0) ? p - unit * wide * 2.0 / pixels : q + unit * wide * 2.0 / pixels;
       place += corner.y * across * wide * 2.0 / pixels;
       gl_Position = vec4(place, 0.5, 1.0);

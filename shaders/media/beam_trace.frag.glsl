@@ -2,7 +2,8 @@
 //
 // Rays of a lamp fill the cone around its casters evenly (a sun's, a disc across its direction). At smooth interfaces a ray
 // is mirrored or bent at random, by Fresnel's reflectance; what is diffuse ends it. Two stretches are kept, each as its ends,
-// its flux in watts, and half the distance to the ray of the next texel as it would be had nothing bent them.
+// its flux in watts, and half the distance to the next ray of all samples as it would be had nothing bent them; and by how
+// much that grows on its way where a mirror that bulges, or the few that are mirrored by glass, send light apart.
 // Leaves out links: in media and through glass light reaches every receiver.
 #include "media/media.glsl"
 #include "light/sources.glsl"
@@ -21,6 +22,55 @@ float dielectric(float cosine, float ior)
   float a = (g - cosine) / (g + cosine);
   float b = ((g + cosine) * cosine - 1.0) / ((g - cosine) * cosine + 1.0);
   return 0.5 * a * a * (1.0 + b * b);
+}
+
+// The part of a stretch that has media around it; false where none has.
+bool within_media(inout vec3 from, inout vec3 to)
+{
+#ifdef MEDIA_WORLD
+  return true;
+#elif defined(MEDIA_BOUNDED)
+  vec3 way = to - from;
+  float reach = length(way);
+  way /= max(reach, 1e-30);
+  media_crossings(from, way);
+  uint inside = media_at_start();
+  float begin = reach;
+  float end = 0.0;
+  float at = 0.0;
+  for (int i = 0; i < media_intervals() && at < reach; i++) {
+    float until = media_until(i, reach);
+    begin = (inside != 0u) ? min(begin, at) : begin;
+    end = (inside != 0u) ? max(end, until) : end;
+    inside = media_behind(i, inside);
+    at = until;
+  }
+  to = from + end * way;
+  from += begin * way;
+  return end > begin;
+#else
+  return false;
+#endif
+}
+
+// By how much a mirror spreads light, for each unit of a beam's width: twice the curvature in the plane of incidence over
+// the cosine, and times it across, in the mean. Of one that is hollow nothing, as it gathers light.
+float mirrored_spread(ivec2 hit, vec3 position, vec3 normal, vec3 direction, float width)
+{
+  float cosine = max(-dot(normal, direction), 0.1);
+  vec3 across = cross(normal, direction);
+  float sine = length(across);
+  vec3 tangent;
+  vec3 bitangent;
+  orthonormal_basis(normal, tangent, bitangent);
+  across = (sine > 1e-4) ? across / sine : tangent;
+  vec3 along = cross(across, normal);
+  float apart = max(width, 1e-6);
+  vec3 here = triangle_shading_normal(hit, position);
+  float side = (dot(here, normal) < 0.0) ? -1.0 : 1.0;
+  float within = side * dot(triangle_shading_normal(hit, position + apart * along) - here, along) / apart;
+  float beside = side * dot(triangle_shading_normal(hit, position + apart * across) - here, across) / apart;
+  return max(within / cosine + beside * cosine, 0.0);
 }
 
 void main()
@@ -88,11 +138,16 @@ void main()
     flux *= light_tree(light, direction, position, length(to_casters));
     spread = 0.5 * sqrt(solid_angle);
   }
+  width *= closer;
+  spread *= closer;
   uint seed = salt;
+  uint choice = hash3(uvec3(uint(film_view.sample_index), uint(film_view.seed), 977u)).x;
   bool inside_glass = false;
   bool bent = false;
   int kept = 0;
   float travelled = 0.0;
+  float apart = 1.0;   // how much farther from each other than rays of the grid those are that do the same
+  float growth = 0.0;  // of the half width, by what has mirrored the ray
   for (int i = 0; i < INTERFACES; i++) {
     if (!(max_component(abs(flux)) > 0.0)) {  // lamps may have negative power
       return;
@@ -108,10 +163,12 @@ void main()
     vec4 kind = beam_table_fetch(ivec2(1, material));
     bool is_glass = !missed && kind.x > 0.5 && kind.x < 1.5;
     // Within a solid of glass none is seen; below a sheet of water, whose light never leaves it again, all of it.
-    if (bent && !(inside_glass && is_glass) && kept < 2) {
-      vec4 start = vec4(position, 1.0);
-      vec4 end = vec4(position + reach * direction, 1.0);
-      vec4 carried = vec4(flux, width + spread * travelled);
+    vec3 from = position;
+    vec3 to = position + reach * direction;
+    if (bent && !(inside_glass && is_glass) && kept < 2 && within_media(from, to)) {
+      vec4 start = vec4(from, 1.0);
+      vec4 end = vec4(to, growth);
+      vec4 carried = vec4(flux, (width + spread * travelled) * apart + growth * distance(from, position));
       if (kept == 0) {
         out_start0 = start;
         out_end0 = end;
@@ -145,8 +202,14 @@ void main()
       float ior = leaves ? 1.0 / glass.w : glass.w;
       float cosine = -dot(smooth_normal, direction);
       float reflectance = dielectric(cosine, ior);
-      bool mirrored = media_random(seed) < reflectance;
+      // At the first two interfaces neighbours take numbers far apart, so that each share of them does what it should.
+      vec2 lattice = (i == 0) ? vec2(0.7548777, 0.5698403) : vec2(0.8191725, 0.6710436);
+      float turn = fract(dot(floor(gl_FragCoord.xy), lattice) + media_random(choice));
+      bool mirrored = ((i < 2) ? turn : media_random(seed)) < reflectance;
+      apart *= inversesqrt(max(mirrored ? reflectance : 1.0 - reflectance, 1e-4));
       if (mirrored) {
+        float half_width = (width + spread * travelled) * apart;
+        growth += leaves ? 0.0 : half_width * mirrored_spread(hit, position, smooth_normal, direction, half_width);
         direction = safe_normalize(direction + 2.0 * cosine * smooth_normal);
       }
       else {
@@ -160,6 +223,8 @@ void main()
     }
     else if (kind.x > 1.5) {  // a mirror
       flux *= glass.rgb;
+      float half_width = (width + spread * travelled) * apart;
+      growth += half_width * mirrored_spread(hit, position, smooth_normal, direction, half_width);
       direction = safe_normalize(direction - 2.0 * dot(direction, smooth_normal) * smooth_normal);
       position = ray_origin(position, facing);
     }

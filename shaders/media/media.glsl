@@ -114,13 +114,12 @@ vec3 media_depth(uint inside, vec3 origin, vec3 direction, float from, float to,
   return depth;
 }
 
-// The share of light that passes from the ray's start to `limit`.
-vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
+// The share of light that passes from the ray's start to `limit`, of the ray whose crossings were asked for last.
+vec3 media_transmittance_known(vec3 origin, vec3 direction, float limit, uint salt)
 {
   uint seed = salt;
   vec3 depth = vec3(0.0);
 #ifdef MEDIA_BOUNDED
-  media_crossings(origin, direction);
   uint inside = media_at_start();
   float from = 0.0;
   for (int i = 0; i < media_intervals() && from < limit; i++) {
@@ -133,4 +132,13 @@ vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
   depth = media_depth(1u, origin, direction, 0.0, limit, seed);
 #endif
   return exp(-min(depth, vec3(1e30)));
+}
+
+// The same of any ray.
+vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
+{
+#ifdef MEDIA_BOUNDED
+  media_crossings(origin, direction);
+#endif
+  return media_transmittance_known(origin, direction, limit, salt);
 }
