@@ -1,27 +1,27 @@
 """Virtual lights: points on surfaces that light the picture with the radiance they reflect, for any gatherer.
 
-Candidates are found from the picture, as in bidirectional instant radiosity (Segovia et al. 2006): at P pixels of a
-coarse grid, shifted in every sample ("probes"), R cosine-distributed rays are traced; where one meets a surface, at y,
-stands a candidate. It has the direct light that y reflects, and what a path on from y finds in up to `bounces`
-reflections in all:
+Candidates are found from the picture, as in bidirectional instant radiosity (Segovia et al. 2006): at P points of
+what it shows, in cells of space ("probes", probes.py), R cosine-distributed rays are traced; where one meets a
+surface, at y, stands a candidate. It has the direct light that y reflects, and what a path on from y finds in up to
+`bounces` reflections in all:
 
     L(y) = rho / pi * (E(y) + sum over further bounces of their albedos x E there)
 
 From its second reflection on a path ends by Russian roulette. GROUP neighbouring candidates that face alike share the
-next vertices of their paths, weighted by the balance heuristic (path reuse, Bekaert et al. 2002). Any probe could have
-found y, so the density of candidates is the sum over all probes x:
+next vertices of their paths, weighted by the balance heuristic (path reuse, Bekaert et al. 2002). Any probe could
+have found y, so the density of candidates is the sum over all probes x:
 
     n(y) = sum over x of  R cos_x cos_y V(x, y) / (pi |x - y|^2)      per m2
 
-A candidate has the intensity L / n. `count` of them are kept by systematic resampling in proportion to L, cell by cell
-along a space-filling curve (after Georgiev & Slusallek 2010), so that one candidate more or less changes only what is
-kept nearby. Densities are traced for those kept alone. Surfaces have the picture's colours where the camera sees them,
-else their material's mean (reflectance.py), and a lobe of microfacets towards the probe that found them.
+A candidate has the intensity L / n. `count` of them are kept by systematic resampling in proportion to L, cell by
+cell along a space-filling curve (after Georgiev & Slusallek 2010), so that one candidate more or less changes only
+what is kept nearby. Densities are traced for those kept alone. Surfaces have the picture's colours where the camera
+sees them, else their material's mean (reflectance.py), and a lobe of microfacets towards the probe that found them.
 
 | cost | per sample, with P = 192 probes and N virtual lights |
 |---|---|
 | candidates, rays | max(1152, 4 N); 2 per bounce + 19 for each, then 192 for the density of each virtual light |
-| passes, readbacks | 16, most over the candidates alone (lighting/light_choice.py); none |
+| passes, readbacks | 24, most over the candidates or a grid of pixels alone (light_choice.py, probes.py); none |
 
 Bias (diffuse and glossy indirect light): light that reaches less than about half a hundredth of the picture is missed
 where no probe comes near. A light for the area A in one of n samples is clamped at the distance sqrt(A / (pi n)); the

@@ -8,15 +8,15 @@ of the same surface with its own fresh light:
 
 so that n pictures of a still surface have the error of n samples. The same surface is one that lies on the tangent
 plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees). What was hidden before has no
-history: its light is the fresh one. Indirect light is filtered over neighbours (film/neighbours.py) when it is joined,
-not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. While objects move n is
+history: its light is the fresh one. Indirect light is filtered over neighbours (film/neighbours.py) when it is
+joined, not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. While objects move n is
 at most FEW, and light straight from sources is kept within the spread of what is fresh on 5x5 pixels, so that shadows
 move along. After any other edit there is no history at all (frame/history.py); what shines is never carried, since it
 moves otherwise than its surface.
 
-In drafts of the viewport, and, where `animation` says so, in final pictures drawn one after the other by one process;
-a picture then depends on those before it. Never in slices, with motion blur or where samples may end early: all
-machines would need the same past.
+In drafts of the viewport, and, where `animation` says so, in final pictures of one sample drawn one after the other
+by one process; a picture then depends on those before it. Never in slices, with motion blur or where samples may end
+early: all machines would need the same past.
 
 | cost | per picture |
 |---|---|
@@ -105,6 +105,8 @@ class History(Technique):
             return "the picture is at rest"
         if not settings.get(self, "animation"):
             return "it is off in final pictures"
+        if settings.samples > 1:
+            return "it joins light in pictures of one sample alone"
         if settings.is_slice or settings.may_end_early:
             return "other machines, or other runs, would have another past"
         return "motion blur looks at several moments" if snapshot.motion is not None else None
