@@ -1,11 +1,12 @@
 """What a picture asks of the GPU, and Python's own time in it, counted: `python -m bench counted`, which needs no GPU.
 
 Of each scene, at 16x12 pixels and one sample after a move of the camera: readbacks, draws, dispatches, uploads,
-framebuffers, and the functions that take the longest themselves. Of several pictures each function's least time counts,
-so that what else the machine does adds little.
+programs bound, framebuffers, and the functions that take the longest themselves. Of several pictures each function's
+least time counts, so that what else the machine does adds little.
 
 Calls into Blender's GPU module are counted by Python's profiler, framebuffers where `gfx` makes them. Own time is what
-the add-on's functions take themselves, without what they call in numpy, Blender and the driver.
+the add-on's functions take themselves, without what they call in numpy, Blender and the driver; Python's is all but the
+calls into Blender, with the profiler, which at least doubles what such short functions take.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import cProfile
 import pstats
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+
+from bench.profile import is_blender, is_gpu
 
 DRAWS = ("draw", "draw_instanced", "draw_range")
 
@@ -29,6 +32,8 @@ class Counts:
     dispatches: int
     uploads: int  # images made with content, and uniform blocks written
     framebuffers: int
+    passes: int  # programs bound: full-screen passes, and materials and views of meshes
+    python_ms: float
     own_ms: float
 
 
@@ -80,9 +85,10 @@ def _name(function: tuple[str, int, str]) -> str:
 def of_stats(stats: dict, framebuffers: int) -> Counts:
     """The same from pstats' rows."""
     calls: dict[str, int] = {}
-    own = 0.0
+    own = python = 0.0
     for function, (_, count, seconds, *_) in stats.items():
         own += seconds if _is_own(function) else 0.0
+        python += 0.0 if is_gpu(function) or is_blender(function) else seconds
         name = _name(function)
         calls[name] = calls.get(name, 0) + count
 
@@ -97,6 +103,8 @@ def of_stats(stats: dict, framebuffers: int) -> Counts:
         dispatches=sum(count for name, count in calls.items() if name.startswith("<built-in") and "dispatch" in name),
         uploads=calls.get("gfx/images.py:upload", 0) + gpu_calls("GPUUniformBuf", "update"),
         framebuffers=framebuffers,
+        passes=calls.get("gfx/library.py:bind", 0),
+        python_ms=1000 * python,
         own_ms=1000 * own,
     )
 
@@ -118,7 +126,7 @@ class _Watched:
 # ------------------------------------------------------------------------------------------------------------- command
 
 
-COUNTED = ("cornell_box", "window_interior", "soft_shadow_garden", "instances")
+COUNTED = ("cornell_box", "window_interior", "alpha_foliage", "soft_shadow_garden", "instances")
 SIZE = (16, 12)
 PICTURES, BEFORE = 8, 4  # that are profiled, and drawn before
 
@@ -150,8 +158,9 @@ def command(options: argparse.Namespace) -> int:
             for _ in range(BEFORE):
                 moved()
             counts, functions = counted_often(moved, PICTURES)
-            figures = ", ".join(f"{field.name} {getattr(counts, field.name)}" for field in fields(Counts)[:-1])
-            print(f"{name}: {figures}; Python's own {counts.own_ms:.1f} ms", file=terminal, flush=True)
+            figures = ", ".join(f"{field.name} {getattr(counts, field.name)}" for field in fields(Counts)[:-2])
+            times = f"Python {counts.python_ms:.1f} ms, its own {counts.own_ms:.1f}"
+            print(f"{name}: {figures}; {times}", file=terminal, flush=True)
             for milliseconds, calls, function in functions[: options.top]:
                 print(f"  {milliseconds:7.2f} ms {calls:6}  {function}", file=terminal, flush=True)
     return 0
