@@ -25,7 +25,7 @@ ENTRANTS = (
     (EEVEE, 16),
 )  # fmt: skip
 HEAD = ("scene", "engine", "samples", "seconds", "times without fog", "relMSE", "mean")
-CROP = (128, 96)  # pixels of each picture on the sheet
+CROP = (192, 144)  # pixels of each picture on the sheet
 SHOWN = ((CANDELA, 1), (CANDELA, 16), (DENOISED, 16))
 
 
