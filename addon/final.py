@@ -355,27 +355,29 @@ def mean_images(
     return arrays
 
 
-def _has_negative_light(frame: Frame) -> bool:
-    """Whether a lamp, a material or the world takes light away."""
+def _may_have_negative_light(frame: Frame) -> bool:
+    """Whether a lamp, a material or the world takes light away; those that differ from place to place may."""
     snapshot = frame.snapshot
-    lamps = any(np.min(light.strength) < 0 for light in snapshot.lights)
-    materials = any(min(*one.emission, *one.emission_behind) < 0 for one in frame.materials.compiled)
+    lamps = any(np.min(light.strength) < 0 or light.graph is not None for light in snapshot.lights)
+    materials = any(
+        one.uneven_emission or min(*one.emission, *one.emission_behind) < 0 for one in frame.materials.compiled
+    )
     return lamps or materials or bool(frame.environment.color.min() < 0 or frame.environment.pixels.min() < 0)
 
 
 def _without_negative(arrays: dict[str, np.ndarray], exposure: float) -> None:
     """Raise to 0 what estimates by differences (a world's irradiance, known where nothing is in the way) have left
-    below it in single pixels of few samples; the picture stays the sum of its light."""
+    below it in single pixels of few samples; the picture stays the sum of its light. What a material or the world
+    sends out itself stays as they say: it may be data, and below 0."""
     added = 0.0
     for path in LIGHT_PATHS:
         light = arrays.get(path.image)
-        if light is not None and (light[..., :3] < 0).any():
+        if light is not None and path.name not in ("emission", "environment") and (light[..., :3] < 0).any():
             raised = np.maximum(light[..., :3], 0.0)
             added = added + (raised - light[..., :3])
             light[..., :3] = raised
-    picture = arrays[COMBINED]
-    if (picture[..., :3] < 0).any() or np.any(added):
-        picture[..., :3] = np.maximum(picture[..., :3] + exposure * added, 0.0)
+    if np.any(added):
+        arrays[COMBINED][..., :3] += exposure * added
 
 
 def pixels_of(
@@ -383,7 +385,7 @@ def pixels_of(
 ) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     arrays = total.finished({name for asked in wanted for name in asked.images})
-    if not _has_negative_light(frame):
+    if not _may_have_negative_light(frame):
         _without_negative(arrays, frame.snapshot.film.exposure)
     arrays[CATCHER.source] = np.ones_like(arrays[COMBINED][..., :3])
     if plates:

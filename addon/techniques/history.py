@@ -60,7 +60,7 @@ RECALL = passes.fullscreen_program(
         *(("RGBA32F", f"before_{write.name.partition('.')[2]}") for write in REMEMBERED),
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("FLOAT", "many"), ("FLOAT", "few")),
+    constants=(("FLOAT", "most_still"), ("FLOAT", "most_moved")),
     outputs=tuple(
         ("VEC4", f"out_{name}") for name in ("place", "facing", "direct", "indirect", "direct_light", "indirect_light")
     ),
@@ -128,7 +128,7 @@ class History(Technique):
                     **{f"before_{name.partition('.')[2]}": image for name, image in kept.items()},
                 },
                 blocks={"film_view": frame.view_block},
-                constants={"many": float(MANY), "few": float(FEW)},
+                constants={"most_still": float(MANY), "most_moved": float(FEW)},
             )  # fmt: skip
             if frame.settings.samples == 1 or frame.settings.draft:
                 self._filtered(frame, indirect)

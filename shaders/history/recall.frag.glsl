@@ -115,12 +115,12 @@ vec3 reflected(vec3 light, vec3 color, vec3 fresh)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec4 fresh_direct = fresh_direct_fetch(pixel);
-  vec4 fresh_indirect = fresh_indirect_fetch(pixel);
+  vec4 new_direct = fresh_direct_fetch(pixel);
+  vec4 new_indirect = fresh_indirect_fetch(pixel);
   vec4 position = surface_position_fetch(pixel);
   out_place = out_facing = out_direct = out_indirect = vec4(0.0);
-  out_direct_light = fresh_direct;
-  out_indirect_light = fresh_indirect;
+  out_direct_light = new_direct;
+  out_indirect_light = new_indirect;
   vec3 color = surface_diffuse_fetch(pixel).rgb;
   if (position.w == 0.0 || !(max_component(color) > 1e-3)) {
     return;
@@ -145,11 +145,11 @@ void main()
   if (found.weight == 0.0) {
     found = recall(position.xyz + shift, normal, tolerance);
   }
-  vec3 direct = arriving(fresh_direct.rgb, color);
-  vec3 indirect = arriving(fresh_indirect.rgb, color);
+  vec3 direct = arriving(new_direct.rgb, color);
+  vec3 indirect = arriving(new_indirect.rgb, color);
   vec2 counts = vec2(0.0);
   if (found.weight > 0.0) {
-    counts = min(found.counts, (moved > 0) ? vec2(few, few) : vec2(many, many));
+    counts = min(found.counts, (moved > 0) ? vec2(most_moved) : vec2(most_still));
     if (moved > 0) {
       vec3 low;
       vec3 high;
@@ -158,8 +158,8 @@ void main()
     }
     direct = mix(found.direct, direct, 1.0 / (1.0 + counts.x));
     indirect = mix(found.indirect, indirect, 1.0 / (1.0 + counts.y));
-    out_direct_light.rgb = reflected(direct, color, fresh_direct.rgb);
-    out_indirect_light.rgb = reflected(indirect, color, fresh_indirect.rgb);
+    out_direct_light.rgb = reflected(direct, color, new_direct.rgb);
+    out_indirect_light.rgb = reflected(indirect, color, new_indirect.rgb);
   }
   counts += 1.0;
   out_place = vec4(position.xyz, counts.x);
