@@ -409,7 +409,7 @@ def test_walks_light_a_ball_from_behind_as_in_cycles(stage):
     sphere(stage, scattering(stage, "RANDOM_WALK", 0.4 * WALK, radius=(1, 0.6, 0.3)), radius=1.0)
     stage.light("SUN", turn=(2.4, 0, 0), energy=np.pi, angle=0.1)
     stage.camera_above(0.9, 5.0)
-    cycles = shown(stage.render(128, size=(24, 24), engine="CYCLES")).mean(axis=(0, 1))
+    cycles = shown(stage.render(512, size=(24, 24), engine="CYCLES")).mean(axis=(0, 1))
     assert shown(stage.render(16, size=(24, 24))).mean(axis=(0, 1)) == pytest.approx(cycles, rel=0.05, abs=2e-4)
 
 
