@@ -178,7 +178,8 @@ def test_light_does_not_depend_on_the_scale_of_the_scene(stage, render, scale):
 @pytest.mark.parametrize("aside", [0.0, 2.5])
 def test_a_single_cluster_casts_the_penumbra_of_its_area(stage, render, aside, shadows):
     """A card of 1 m, 4 m above a floor, lit from below, half-way a half plane: its penumbra is a ramp of 1 m, straight
-    below the card and `aside` metres beside it, where the card is seen from 32 degrees."""
+    below the card and `aside` metres beside it, where the card is seen from 32 degrees. Some 80 of the virtual lights
+    lie on the card, so the middle of one picture's cluster is off by centimetres: it is the mean of several seeds."""
     stage.floor(6.0, material=stage.diffuse(0.5))
     card = stage.blocker((-0.5, -0.5), (0.5, 0.5), 4.0, material=stage.diffuse(0.8))
     card.visible_shadow = False
@@ -187,9 +188,12 @@ def test_a_single_cluster_casts_the_penumbra_of_its_area(stage, render, aside, s
     stage.camera_above(4.0).location.x = aside
     size, shared = (48, 48), {"virtual_lights": 2048, "levels": 0}
     params = {"clusters": 1, "rays": 0, "refine": False, "map_size": 128}
-    clustered = render(1, 2, size, shadows=shadows, **params, **shared)
-    unshadowed = diffuse_indirect(stage.scene, 1, 2, size, "multires_radiosity", rays=0, **shared)
-    visible = (clustered / unshadowed).mean(axis=(0, 2))
+    found = []
+    for seed in range(6):
+        clustered = render(1, 2, size, seed=seed, shadows=shadows, **params, **shared)
+        unshadowed = diffuse_indirect(stage.scene, 1, 2, size, "multires_radiosity", seed, rays=0, **shared)
+        found.append((clustered / unshadowed).mean(axis=(0, 2)))
+    visible = np.mean(found, axis=0)
     place = (np.arange(48) - 23.5) / 12
     assert np.abs(visible - np.clip(0.5 - place, 0, 1)).mean() < 0.02
     width = np.subtract(*np.interp([-0.1, -0.9], -visible, place)) / 0.8

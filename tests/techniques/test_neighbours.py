@@ -36,6 +36,7 @@ def frame_of(gpu_context):
         frame = SimpleNamespace(
             size=(SIZE, SIZE), is_first=True, samples_done=1,
             settings=SimpleNamespace(samples=samples, draft=samples == 1, whole=whole),
+            plan=SimpleNamespace(techniques=()),
             images={name: images.upload(np.dstack(layer).astype(np.float32)) for name, layer in layers.items()},
             view_block=Block(VIEW, **values), count=lambda *counter: None,
         )  # fmt: skip
