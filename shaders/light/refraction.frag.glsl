@@ -224,6 +224,11 @@ void main()
       rest.met.position = rest.origin = position;
       rest.met.normal = rest.met.lit = rest.met.turned = geometric_normal;
       rest.met.upright = 1.0;
+#ifdef HIT_LINKS
+      rest.met.group = triangle_links(hit).x;
+#endif
+      rest.met.leaving = vec3(0.0);
+      rest.met.straight = vec3(1.0);
       rest.met.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
       rest.met.reflection.through = 0.0;
       rest.met.reflection.straight = vec3(0.0);
