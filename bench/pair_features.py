@@ -327,32 +327,29 @@ def relief(room):
 # ------------------------------------------------------------------------------------------------- objects and settings
 
 
-@feature
-def light_linking(room):
-    """The lamp leaves the block out."""
+def _excluded(room, role: str) -> None:
+    """Exclude the block from a collection of the lamp's links; Blender before 4.0 has none."""
     import bpy
 
     if not hasattr(room.lamp, "light_linking"):
         return
-    receivers = bpy.data.collections.new("Receivers")
-    receivers.objects.link(room.block)
-    room.lamp.light_linking.receiver_collection = receivers
-    for item in receivers.collection_objects:
+    made = bpy.data.collections.new(role)
+    made.objects.link(room.block)
+    setattr(room.lamp.light_linking, role, made)
+    for item in made.collection_objects:
         item.light_linking.link_state = "EXCLUDE"
+
+
+@feature
+def light_linking(room):
+    """The lamp leaves the block out."""
+    _excluded(room, "receiver_collection")
 
 
 @feature
 def shadow_linking(room):
     """The block does not block the lamp."""
-    import bpy
-
-    if not hasattr(room.lamp, "light_linking"):
-        return
-    blockers = bpy.data.collections.new("Blockers")
-    blockers.objects.link(room.block)
-    room.lamp.light_linking.blocker_collection = blockers
-    for item in blockers.collection_objects:
-        item.light_linking.link_state = "EXCLUDE"
+    _excluded(room, "blocker_collection")
 
 
 @feature

@@ -71,6 +71,20 @@ void media_at(uint inside, vec3 position, inout uint seed, out vec3 scattering, 
   }
 }
 
+// A medium with what it scatters at a place.
+Medium medium_scattering_at(int medium, vec3 position, uint cell_seed)
+{
+  Medium m = medium_read(medium);
+#ifdef MEDIA_GRIDS
+  if (m.grid > 0.5) {
+    ivec2 cell = medium_cell(medium, position, cell_seed + uint(medium));
+    m.scattering = media_scattering_fetch(cell - medium_first_row(medium)).rgb;
+    m.anisotropy = media_table_fetch(cell).w;
+  }
+#endif
+  return m;
+}
+
 // Scattering coefficient times phase function, for light that goes on along `out_direction` after `in_direction`.
 vec3 media_scattered(uint inside, vec3 position, vec3 in_direction, vec3 out_direction, uint cell_seed)
 {
@@ -79,16 +93,7 @@ vec3 media_scattered(uint inside, vec3 position, vec3 in_direction, vec3 out_dir
   while (inside != 0u) {
     int medium = findLSB(inside);
     inside &= inside - 1u;
-    Medium m = medium_read(medium);
-#ifdef MEDIA_GRIDS
-    if (m.grid > 0.5) {
-      uint seed = cell_seed + uint(medium);
-      ivec2 cell = medium_cell(medium, position, seed);
-      ivec2 first = medium_first_row(medium);
-      m.scattering = media_scattering_fetch(cell - first).rgb;
-      m.anisotropy = media_table_fetch(cell).w;
-    }
-#endif
+    Medium m = medium_scattering_at(medium, position, cell_seed);
     sum += m.scattering * phase_value(m.phase, m.anisotropy, m.phase_values, mu);
   }
   return sum;
@@ -103,16 +108,7 @@ vec3 media_scattered_by_unit(uint inside, vec3 position, vec3 in_direction, vec3
   while (inside != 0u) {
     int medium = findLSB(inside);
     inside &= inside - 1u;
-    Medium m = medium_read(medium);
-#ifdef MEDIA_GRIDS
-    if (m.grid > 0.5) {
-      uint seed = cell_seed + uint(medium);
-      ivec2 cell = medium_cell(medium, position, seed);
-      ivec2 first = medium_first_row(medium);
-      m.scattering = media_scattering_fetch(cell - first).rgb;
-      m.anisotropy = media_table_fetch(cell).w;
-    }
-#endif
+    Medium m = medium_scattering_at(medium, position, cell_seed);
     vec3 amount = m.scattering + 1e-20;  // where nothing scatters, something beside it may
     sum += amount * phase_value(m.phase, m.anisotropy, m.phase_values, mu);
     total += amount;
@@ -128,16 +124,7 @@ float media_lobe(uint inside, vec3 position, uint cell_seed)
   while (inside != 0u) {
     int medium = findLSB(inside);
     inside &= inside - 1u;
-    Medium m = medium_read(medium);
-#ifdef MEDIA_GRIDS
-    if (m.grid > 0.5) {
-      uint seed = cell_seed + uint(medium);
-      ivec2 cell = medium_cell(medium, position, seed);
-      ivec2 first = medium_first_row(medium);
-      m.scattering = media_scattering_fetch(cell - first).rgb;
-      m.anisotropy = media_table_fetch(cell).w;
-    }
-#endif
+    Medium m = medium_scattering_at(medium, position, cell_seed);
     float weight = dot(m.scattering, vec3(1.0));
     sum += weight * phase_lobe(m.phase, m.anisotropy, m.phase_values);
     total += weight;
