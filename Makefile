@@ -11,7 +11,7 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-all test-fast test-vulkan stress check matrix mutations package site test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport bench-beside clean
+.PHONY: help environment demo pictures samples test test-all test-more test-fast test-vulkan stress check matrix mutations package site test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport bench-beside clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
@@ -39,6 +39,9 @@ test: environment ## the tests that take seconds, and a sample of the slow ones 
 test-all: test ## every test that needs no window: those of `make test`, then the other slow ones
 	$(PYTHON) -m pytest $(PARALLEL) -m "slow and not window and not timing" --slow=rest
 	$(PYTHON) -m pytest -m "slow and timing" --slow=rest || [ $$? = 5 ]  # 5: none is left
+
+test-more: environment ## a quarter of the slow tests beside those of `make test`: with it, what CI runs of them
+	$(PYTHON) -m pytest $(PARALLEL) -m "slow and not window and not timing" --slow=more
 
 test-fast: environment ## the tests that take seconds
 	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing and not slow"
