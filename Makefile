@@ -32,7 +32,7 @@ samples: ## write the sample scenes anew, with Blender 4.5, so that every suppor
 	.venv-4.5/bin/python sample_blends/make.py
 
 test: environment ## the tests that take seconds, and a sample of the slow ones (CANDELA_SAMPLE=seed): about 10 minutes
-	@echo "About 10 minutes on two cores; 'make test-all' runs every test, in about 25."
+	@echo "About 10 minutes on two cores; 'make test-all' runs every test, in 25 to 50."
 	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing" --slow=sample
 	$(PYTHON) -m pytest -m timing --slow=sample
 
