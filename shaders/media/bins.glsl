@@ -77,7 +77,8 @@ Medium medium_scattering_at(int medium, vec3 position, uint cell_seed)
   Medium m = medium_read(medium);
 #ifdef MEDIA_GRIDS
   if (m.grid > 0.5) {
-    ivec2 cell = medium_cell(medium, position, cell_seed + uint(medium));
+    uint seed = cell_seed + uint(medium);
+    ivec2 cell = medium_cell(medium, position, seed);
     m.scattering = media_scattering_fetch(cell - medium_first_row(medium)).rgb;
     m.anisotropy = media_table_fetch(cell).w;
   }

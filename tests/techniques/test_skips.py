@@ -75,6 +75,10 @@ def no_glare(stage):
     stage.scene.camera.data.candela.glare_mode = "OFF"
 
 
+def remembering(stage):
+    stage.scene.candela.history_animation = True
+
+
 def no_needs(stage):
     """Nothing of what this technique alone needs: the room as it is."""
 
@@ -122,12 +126,14 @@ WITH = {
     "volume_caustics": foggy,
     "image_space_subsurface": waxen,
     "reflection_editing": edited,
+    "history": remembering,
 }
 
 
 def samples_for(technique):
-    """With fewer than four a picture is not denoised; all else has had its first and a later one."""
-    return 4 if technique.name == "denoise" else 2
+    """With fewer than four a picture is not denoised, and one of a single sample remembers; all else has had its first
+    and a later one."""
+    return {"denoise": 4, "history": 1}.get(technique.name, 2)
 
 
 # For each technique, what to take from the full scene so that it is not needed any more.
@@ -139,6 +145,7 @@ WITHOUT = {
     "volume_caustics": no_needs,
     "image_space_subsurface": no_needs,
     "reflection_editing": no_needs,
+    "history": no_needs,
     "shaded_reflections": no_gloss,
     "light_probes": nothing_lit,
     "accumulated_maps": no_shadow,
