@@ -365,19 +365,22 @@ def _may_have_negative_light(frame: Frame) -> bool:
     return lamps or materials or bool(frame.environment.color.min() < 0 or frame.environment.pixels.min() < 0)
 
 
+def _below_zero(arrays: dict[str, np.ndarray]) -> list[np.ndarray]:
+    """Light paths that surfaces or media send on, of which some pixel is below 0."""
+    sent = [path.image for path in LIGHT_PATHS if path.name not in ("emission", "environment")]
+    return [arrays[name] for name in sent if name in arrays and (arrays[name][..., :3] < 0).any()]
+
+
 def _without_negative(arrays: dict[str, np.ndarray], exposure: float) -> None:
     """Raise to 0 what estimates by differences (a world's irradiance, known where nothing is in the way) have left
     below it in single pixels of few samples; the picture stays the sum of its light. What a material or the world
     sends out itself stays as they say: it may be data, and below 0."""
     added = 0.0
-    for path in LIGHT_PATHS:
-        light = arrays.get(path.image)
-        if light is not None and path.name not in ("emission", "environment") and (light[..., :3] < 0).any():
-            raised = np.maximum(light[..., :3], 0.0)
-            added = added + (raised - light[..., :3])
-            light[..., :3] = raised
-    if np.any(added):
-        arrays[COMBINED][..., :3] += exposure * added
+    for light in _below_zero(arrays):
+        raised = np.maximum(light[..., :3], 0.0)
+        added = added + (raised - light[..., :3])
+        light[..., :3] = raised
+    arrays[COMBINED][..., :3] += exposure * added
 
 
 def pixels_of(
@@ -385,7 +388,7 @@ def pixels_of(
 ) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     arrays = total.finished({name for asked in wanted for name in asked.images})
-    if not _may_have_negative_light(frame):
+    if _below_zero(arrays) and not _may_have_negative_light(frame):
         _without_negative(arrays, frame.snapshot.film.exposure)
     arrays[CATCHER.source] = np.ones_like(arrays[COMBINED][..., :3])
     if plates:

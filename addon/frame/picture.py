@@ -71,9 +71,7 @@ class Frame:
     measured_emission: EmissionMaps
     lamp_maps: LampMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
-    tiles: list[panorama.Tile] = field(
-        default_factory=list
-    )  # by which a panoramic camera is drawn; of another there are none
+    tiles: list[panorama.Tile] = field(default_factory=list)  # by which a panoramic camera is drawn; else none
     sample: int = 0  # the sample that is running
     at: str = ""  # label of the technique that is at work, or was last
     film_points: int = 1  # that a sample shows; the surface technique says it before it looks
@@ -84,9 +82,7 @@ class Frame:
     find_receivers: Callable[[], Receivers] | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
-    shown: dict[str, str] = field(
-        default_factory=dict
-    )  # of a sum of samples: the image, a sum as well, that is shown instead
+    shown: dict[str, str] = field(default_factory=dict)  # by sum of samples: the other sum that is shown instead
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
     needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`

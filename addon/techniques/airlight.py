@@ -58,10 +58,8 @@ from ..surfaces.draw import SURFACES
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
 COARSE = 2  # pixels of one known pixel's side then
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
-FEW_EMISSIVE_POINTS, FEW_WORLD_DIRECTIONS = (
-    16,
-    8,
-)  # below FEW samples, where two are most of what the whole picture gets
+# Below FEW samples, where two are most of what the whole picture gets:
+FEW_EMISSIVE_POINTS, FEW_WORLD_DIRECTIONS = 16, 8
 AS_IN_CYCLES = -1  # bounces: as the scene has them there
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
 MOST_LAMPS = 16  # in a sample

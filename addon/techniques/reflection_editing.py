@@ -297,8 +297,7 @@ def _constraint(
         triangle, weights = surface.nearest(point)
     point = weights @ surface.positions[surface.triangles[triangle]]
     cofactors = np.linalg.det(matrix[:3, :3]) * np.linalg.pinv(matrix[:3, :3]).T
-    normals = mesh.corner_normals[mesh.triangle_corners] @ cofactors.T
-    normal = reflection_edits.unit(weights @ normals[triangle])
+    normal = reflection_edits.unit(cofactors @ (weights @ mesh.corner_normals[mesh.triangle_corners[triangle]]))
     view = reflection_edits.unit(_moved(matrix, one["viewer"]) - point)
     normal = normal if normal @ view >= 0 else -normal
     bends, turned_at = one["of"] == REFRACTION, point
@@ -308,6 +307,7 @@ def _constraint(
         before = reflection_edits.bent(view, normal, ior)
         if closed:
             offset = 1e-4 * float(np.linalg.norm(np.ptp(surface.positions, axis=0)))
+            normals = mesh.corner_normals[mesh.triangle_corners] @ cofactors.T
             turned_at, before = reflection_edits.leaving(surface, normals, point, before, ior, offset)
     else:
         before = reflection_edits.mirrored(view, normal)
