@@ -33,9 +33,11 @@ def _parts() -> tuple:
         scoped_panels,
         translucency,
         tuning,
+        viewport_pass,
     )
 
     return (
         pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
-        reflection_operators, grass, translucency, tuning, pass_operators, compare_editor, preferences, cli,
+        reflection_operators, grass, translucency, tuning, pass_operators, compare_editor, viewport_pass,
+        preferences, cli,
     )  # fmt: skip

@@ -35,7 +35,7 @@ class Strip:
     own_exposure: bool = True  # of each scene; else all have that of the first, as of a flight
 
 
-def _sample_file(name: str) -> None:
+def sample_file(name: str) -> None:
     import bpy
 
     bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends" / f"{name}.blend"))
@@ -54,7 +54,7 @@ def _reflection(name: str) -> None:
     reflection_scenes.make(name)
 
 
-def _over_relief(frame: str) -> None:
+def over_relief(frame: str) -> None:
     """A camera that flies low over stones, past a box that stands in them."""
     import bpy
 
@@ -74,7 +74,7 @@ def _stones_of_mesh(frame: str) -> None:
 
     from bench import relief_scenes
 
-    _over_relief(frame)
+    over_relief(frame)
     place, turn = (
         tuple(value) for value in (bpy.context.scene.camera.location, bpy.context.scene.camera.rotation_euler)
     )
@@ -83,7 +83,7 @@ def _stones_of_mesh(frame: str) -> None:
     camera.location, camera.rotation_euler, camera.data.angle = place, turn, 0.8
 
 
-def _over_grass(name: str) -> None:
+def over_grass(name: str) -> None:
     """A camera that walks over the shipped meadow at eye height, 0.1 m from picture to picture; its tiles repeated, or
     varied."""
     frame, varied = name.split()[0], name.endswith("varied")
@@ -133,7 +133,7 @@ STRIPS = {
     "caustics": Strip(
         (240, 135),
         ("caustics_table", "caustics_pool", "caustics_rings"),
-        _sample_file,
+        sample_file,
         (
             Entrant("CANDELA", 8, (NO_BOUNCES, ("slot_caustics", "OFF"))),
             Entrant("CANDELA", 8, (NO_BOUNCES, ("slot_caustics", "screen_space_photons"))),
@@ -143,8 +143,8 @@ STRIPS = {
     "grass_flight": Strip(
         (128, 96),
         tuple("012345"),
-        lambda frame: _over_grass(f"{frame} varied"),
-        (Entrant("CANDELA", 8, (NO_BOUNCES,), _over_grass), Entrant("CANDELA", 8, (NO_BOUNCES,))),
+        lambda frame: over_grass(f"{frame} varied"),
+        (Entrant("CANDELA", 8, (NO_BOUNCES,), over_grass), Entrant("CANDELA", 8, (NO_BOUNCES,))),
         own_exposure=False,
     ),
     "grass_by_map": Strip(
@@ -159,7 +159,7 @@ STRIPS = {
     "relief_flight": Strip(
         (128, 96),
         tuple("0123456"),
-        _over_relief,
+        over_relief,
         (Entrant("CANDELA", 8, (NO_BOUNCES,)), Entrant("CYCLES", 64, made_by=_stones_of_mesh)),
         bounces=0,
         own_exposure=False,
@@ -192,7 +192,7 @@ def command(options: argparse.Namespace) -> int:
             column, own = _column(scene, strip, None if strip.own_exposure else exposure)
             exposure = own if exposure is None else exposure
             columns.append(column)
-        _write(path, np.concatenate(columns, axis=1))
+        write_picture(path, np.concatenate(columns, axis=1))
         print(path.relative_to(ROOT))
     return 0
 
@@ -223,7 +223,8 @@ def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarra
     return column, exposure
 
 
-def _write(path: Path, shown: np.ndarray) -> None:
+def write_picture(path: Path, shown: np.ndarray) -> None:
+    """Displayed values (H, W, 3), row 0 at the top, as a PNG; the gap at the right end is left out."""
     from addon.compare.png import png
 
     path.parent.mkdir(parents=True, exist_ok=True)

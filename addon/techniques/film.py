@@ -241,8 +241,6 @@ class Film(Technique):
                 textures={"surface_position": position},
                 blocks={"film_view": frame.view_block},
             )
-            if not whole:
-                return  # a viewport shows none of the others
             if film.position:
                 passes.fullscreen(
                     POSITION,
@@ -250,10 +248,10 @@ class Film(Technique):
                     textures={"surface_position": position},
                     constants={"render_origin": tuple(frame.geometry.origin)},
                 )
-            if film.indices:
+            if film.indices and whole:  # a viewport does not show them
                 draw_indices(frame, self, images.Target(drawn, depth))
                 passes.copy(drawn[0], _target(frame, "film.index"))
-        frame.count(self, "passes", film.position + film.indices)
+        frame.count(self, "passes", film.position + (film.indices and whole))
 
     def _between(self, frame: Frame, count: int) -> Iterator[None]:
         """The same sample's light at other points of the film."""

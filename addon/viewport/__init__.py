@@ -28,6 +28,7 @@ from ..snapshot.camera import framed, panoramic_view
 from ..snapshot.errors import unforeseen
 from ..snapshot.scene import Camera, Snapshot
 from ..ui.properties import settings_of
+from ..ui.viewport_pass import shown_pass
 from .pace import SCALES, STEP_S, STEP_SHARE, Pace, coarsest_for
 from .picture import BUDGET_S, MOST_BUDGET_S, REST_S, Viewport
 
@@ -130,6 +131,7 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
     try:
         camera = camera_of_view(region_data, space, looks_through)
         border = render_border(depsgraph, space, camera, looks_through, size)
+        viewport.render_pass = shown_pass(space)
         viewport.step = STEP_SHARE / float(depsgraph.scene.candela.navigation)
         viewport.coarsest = coarsest_for(framed_height(depsgraph, camera, looks_through, size))
         if looks_through is not None and looks_through.data.type == "PANO":

@@ -25,6 +25,8 @@ from ..snapshot.scene import Camera, Snapshot
 from ..surfaces.first_look import FirstLook
 from ..techniques.film import check_tree
 from ..ui.notes import losses
+from ..ui.passes import RenderPass
+from . import one_pass
 from .pace import SCALES, STEP_S, GuidePace, Pace
 
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
@@ -70,6 +72,7 @@ class Viewport:
         self.seconds = 0.0  # spent on the samples of this picture
         self.error = ""
         self.owner: Callable = lambda: None  # weak reference to the engine instance that draws it
+        self.render_pass: RenderPass | None = None  # shown in the picture's place
         self.paused = False  # the artist wants no more samples for now
         self.hidden: tuple = ()  # what the region's own settings hide
         self.news = False  # a ledger that the panels do not show yet
@@ -236,7 +239,10 @@ class Viewport:
         if self._target is None or self._target.size != frame.size:
             self._drop_picture()
             self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
-        passes.copy(self.renderer.show(frame), self._target)
+        if self.render_pass is None:
+            passes.copy(self.renderer.show(frame), self._target)
+        else:
+            one_pass.draw(frame, self.render_pass, self._target)
         self._shown_with, self.looks = frame.shown_with, False
         self._refined = self._with_shapes(frame) if self.scale > 1 else None
         film = frame.snapshot.film
@@ -247,7 +253,7 @@ class Viewport:
 
     def _with_shapes(self, frame: Frame) -> images.Image | None:
         """The draft that is the picture, in finer pixels, if there is time for that and no lens blurs what it shows."""
-        if frame.snapshot.camera.aperture is not None:
+        if frame.snapshot.camera.aperture is not None or self.render_pass is not None:
             return None
         x0, y0, x1, y1 = self._begun_for[2]
         pixels = (x1 - x0) * (y1 - y0)
@@ -312,6 +318,7 @@ class Viewport:
             size,
             border,
             replace(settings, samples=0, values=self.renderer.drawn_with(settings)),
+            self.render_pass,
         )
         view = camera, size, border, settings
         moved, reading = asked != self._asked, 0.0
@@ -350,10 +357,13 @@ class Viewport:
         width, height = (max(-(-extent // scale), 1) for extent in size)
         x, y = width / size[0], height / size[1]
         scaled = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
-        film = replace(self._snapshot.film, width=width, height=height, border=scaled)
+        asked = frozenset(self.render_pass.images if self.render_pass is not None else ())
+        film = replace(
+            self._snapshot.film, width=width, height=height, border=scaled, position="film.position" in asked
+        )
         # A part is done when the GPU has done it; a draft of a moving view is drawn as one, whose passes need not wait
         # for each other.
-        drawn = replace(settings, profile=scale == 1 or why == CLIMBS, shows=frozenset())
+        drawn = replace(settings, profile=scale == 1 or why == CLIMBS, shows=asked)
         if scale > 1:
             drawn = drawn.as_draft()
         parts = self.renderer.beginning(replace(self._snapshot, camera=camera, film=film), drawn)

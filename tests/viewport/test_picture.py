@@ -11,6 +11,7 @@ from addon.frame.bands import Bands
 from addon.gfx import images
 from addon.snapshot import camera_of_scene, camera_of_view
 from addon.snapshot.scene import Note
+from addon.ui import viewport_pass
 from addon.ui.properties import settings_of
 from tests.viewport.region import SIZE
 
@@ -127,3 +128,19 @@ def test_the_text_says_what_the_picture_has_lost(region):
     assert region.viewport.warning().endswith("(and 1 more, in Render Properties)")
     region.viewport.frame.ledger.notes = (Note("Material 'Fur'", 300 * "x" + " is not drawn."),)
     assert len(region.viewport.warning()) <= 160
+
+
+def test_the_menu_of_passes_shows_one_in_the_pictures_place(scene, region):
+    """What the light paths bring sums up to the picture; normals have the length 1; positions are the scene's."""
+    scene.candela.viewport_samples = 1
+    combined = region.rest()[..., :3]
+
+    def shown(key):
+        region.viewport.render_pass = viewport_pass.OFFERED[key]
+        return region.rest()[..., :3]
+
+    total = shown("ENVIRONMENT") + shown("DIFFUSE_COLOR") * (shown("DIFFUSE_DIRECT") + shown("DIFFUSE_INDIRECT"))
+    total += shown("GLOSSY_COLOR") * (shown("GLOSSY_DIRECT") + shown("GLOSSY_INDIRECT"))
+    assert abs(total.mean() - combined.mean()) < 0.02 * combined.mean()
+    assert np.linalg.norm(shown("NORMAL"), axis=-1).max() == pytest.approx(1.0, abs=0.01)
+    assert np.ptp(shown("POSITION")) > 1.0

@@ -1,0 +1,28 @@
+// One render pass as the viewport shows it: a mean over samples, of light over the surface's colour where `divided`, as
+// Cycles writes its passes; a single channel as grey, or three.
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 value = source_fetch(pixel) * scale;
+  vec3 shown = channel < 0 ? value.rgb : vec3(value[channel]);
+  if (divided == 1) {
+    vec3 color = color_fetch(pixel).rgb * color_scale;
+    vec3 quotient = vec3(0.0);
+    float count = 0.0;
+    for (int k = 0; k < 3; k++) {
+      if (color[k] != 0.0) {
+        quotient[k] = shown[k] / color[k];
+        count += 1.0;
+      }
+    }
+    float mean = (quotient.r + quotient.g + quotient.b) / max(count, 1.0);
+    for (int k = 0; k < 3; k++) {
+      if (color[k] == 0.0) {
+        quotient[k] = mean;
+      }
+    }
+    shown = quotient;
+  }
+  out_color = vec4(shown, 1.0);
+}
