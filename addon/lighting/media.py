@@ -34,7 +34,7 @@ RAY_TEXTURES = tuple(("RGBA32F", name) for name in ("lobe_start", "lobe_way", "s
 ON_RAYS = passes.fullscreen_program(
     "media on rays of lobes",
     "media/at_hits.frag.glsl",
-    textures=(*RAY_TEXTURES, *ATTENUATION_TEXTURES),
+    textures=(*RAY_TEXTURES, ("RGBA32F", "met_path"), *ATTENUATION_TEXTURES),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
     constants=(("INT", "light_count"), ("INT", "ray_number")),
     outputs=(("VEC4", "out_passed"),),
@@ -67,7 +67,10 @@ class MediaService(Service):
         the rays may end at, `count` of them."""
         passes.fullscreen(
             ON_RAYS, target, blend="MULTIPLY", where=rays.where,
-            textures={**{name: rays.textures[name] for _, name in RAY_TEXTURES}, **self.media.attenuation()},
+            textures={
+                **{name: rays.textures[name] for name in (*(name for _, name in RAY_TEXTURES), "met_path")},
+                **self.media.attenuation(),
+            },
             blocks={"film_view": frame.view_block, "sources": seen},
             constants={"light_count": count, "ray_number": rays.number},
         )  # fmt: skip

@@ -30,7 +30,7 @@ from ..materials.compiled import CompiledMaterial
 from ..materials.graph import Graph
 from ..materials.volume import PHASES, Medium
 from ..materials.volume_program import CompiledVolume, compile_volume, reads_camera
-from ..snapshot.scene import Instance, Note, Snapshot, Volume
+from ..snapshot.scene import Instance, Note, Snapshot, Visibility, Volume
 from .acceleration import Tree
 from .materials import MATERIAL_SCENE, values_block, values_struct
 from .textures import upload_texture
@@ -76,6 +76,7 @@ class Filled:
     volume: Volume | None = None
     instance: Instance | None = None
     density: float = 1.0  # factor of all coefficients
+    visibility: Visibility = Visibility()  # which rays see it
 
     @property
     def varies(self) -> bool:
@@ -113,7 +114,10 @@ def volumes_key(snapshot: Snapshot) -> tuple:
     return (
         world.medium and world.medium.key, world.volume,
         tuple(material.graph for material in snapshot.materials if material.graph.volume is not None),
-        tuple((one.volume.version, one.matrix.tobytes(), one.material, one.density) for one in snapshot.volumes),
+        tuple(
+            (one.volume.version, one.matrix.tobytes(), one.material, one.density, one.visibility)
+            for one in snapshot.volumes
+        ),
     )  # fmt: skip
 
 
@@ -141,13 +145,18 @@ def filled(snapshot: Snapshot, compiled: list[CompiledMaterial], origin: np.ndar
             low, high = np.asarray(mesh.bounds_min, float), np.asarray(mesh.bounds_max, float)
             box = _affine(matrix, np.column_stack([np.diag(np.maximum(high - low, 1e-12)), low]))
             graph = None if medium.even else snapshot.materials[material].graph
-            made = Filled(medium, graph, corners, box, matrix, one.object_name, None, one)
+            made = Filled(medium, graph, corners, box, matrix, one.object_name, None, one, 1.0, one.visibility)
             if not made.empty and len(corners):
                 found.append(made)
     for one in snapshot.volumes:
         medium, volume = compiled[one.material].medium, one.volume
         graph = snapshot.materials[one.material].graph
         if medium is None or graph.volume is None:
+            continue
+        read = {attribute.name for attribute in compile_volume(one.object_name, graph, snapshot.images).attributes}
+        if read.isdisjoint(volume.grids):
+            text = "its material reads none of its grids, so that it is not drawn, as in Cycles: name one in an Attribute node."
+            notes.append(Note(f"Object '{one.object_name}'", text))
             continue
         matrix = one.matrix[:3].copy()
         matrix[:, 3] -= origin
@@ -157,7 +166,9 @@ def filled(snapshot: Snapshot, compiled: list[CompiledMaterial], origin: np.ndar
         corners = places[BOX]
         if np.linalg.det(box[:, :3]) < 0:
             corners = corners[:, ::-1]
-        found.append(Filled(medium, graph, corners, box, matrix, one.object_name, volume, None, one.density))
+        found.append(
+            Filled(medium, graph, corners, box, matrix, one.object_name, volume, None, one.density, one.visibility)
+        )
     if len(found) > MOST_MEDIA:
         text = f"{len(found)} volumes are more than the {MOST_MEDIA} that are drawn; the last ones are left out."
         notes.append(Note("Scene", text))
@@ -314,7 +325,7 @@ class Media:
             snapshot.camera.matrix.tobytes() if follows else None,
             tuple(id(one) for one in (snapshot.instances if uneven_world else bound)),
             tuple(
-                (one.volume.key, one.volume.version, one.matrix.tobytes(), one.material, one.density)
+                (one.volume.key, one.volume.version, one.matrix.tobytes(), one.material, one.density, one.visibility)
                 for one in snapshot.volumes
             ),
             tuple((k, _key_of(compiled[k]), snapshot.materials[k].graph) for k in sorted(used)),
@@ -357,6 +368,7 @@ class Media:
                 jobs.append((one, size, rows))
                 rows += -(-int(np.prod(size)) // images.LIST_WIDTH)
                 self.cells += int(np.prod(size))
+        apart = _list_seen(table, self.found, first)
         table[-1, 0] = images.LIST_WIDTH + len(nodes)  # where the leaves begin
         listed = images.upload_list(np.concatenate([table, nodes, leaves]))
         notes += self._bake(jobs, rows, listed, snapshot, origin)
@@ -364,6 +376,7 @@ class Media:
             *((("MEDIA_WORLD", "1"),) if first == 0 else ()),
             *((("MEDIA_BOUNDED", "1"),) if any(one.corners is not None for one in self.found) else ()),
             *((("MEDIA_GRIDS", "1"),) if jobs else ()),
+            *((("MEDIA_APART", "1"),) if apart else ()),
         )
         self.notes = tuple(notes)
 
@@ -434,6 +447,19 @@ class Media:
 
 def _key_of(material: CompiledMaterial) -> tuple | None:
     return material.medium and material.medium.key
+
+
+RAYS = "camera", "shadow", "diffuse", "glossy", "transmission", "volume"  # as in shaders/media/boundary.glsl
+
+
+def _list_seen(table: np.ndarray, found: list[Filled], first: int) -> bool:
+    """Write into the table which media each kind of ray sees; whether any sees less than all. Bit 0 is the world's."""
+    apart = False
+    for kind, name in enumerate(RAYS):
+        bits = 1 | sum(1 << (k + first) for k, one in enumerate(found) if getattr(one.visibility, name))
+        table[-2 - kind, :2] = bits & 0x7FFF, bits >> 15
+        apart |= not all(getattr(one.visibility, name) for one in found)
+    return apart
 
 
 def _grid_size(one: Filled, resolution: int) -> np.ndarray:

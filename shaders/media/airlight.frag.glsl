@@ -57,6 +57,7 @@ void main()
   ray.direction = lobe_way_fetch(pixel).xyz;
   vec4 met = surface_position_fetch(pixel);
   ray.limit = (met.w != 0.0) ? max(dot(met.xyz - ray.origin, ray.direction), 0.0) : FARTHEST_MEDIUM;
+  media_asked_by(path_is_bent(int(met_path_fetch(pixel).w + 0.5)) ? MEDIA_OF_TRANSMISSION : MEDIA_OF_GLOSSY);
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 181 + ray_number);
 #else
   out_direct = vec4(0.0);
@@ -64,6 +65,7 @@ void main()
   ivec2 size = surface_position_size();
   ivec2 pixel = min(ivec2(gl_FragCoord.xy) * stride + shown_pixel, size - 1);
   ViewRay ray = view_ray(surface_position_fetch(pixel), vec2(pixel) + 0.5);
+  media_asked_by(MEDIA_OF_CAMERA);
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 43);
 #endif
   uint seed = roll.x;

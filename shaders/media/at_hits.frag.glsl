@@ -1,6 +1,7 @@
 // What media let pass along rays of lobes, up to what each has met or, where it is nearer, a lamp that it sees.
 // Leaves out links: it asks where lamps stand, not whom they light.
 #include "media/media.glsl"
+#include "hits/path.glsl"
 #include "light/sources.glsl"
 
 void main()
@@ -18,5 +19,6 @@ void main()
     limit = (max_component(abs(radiance)) > 0.0) ? min(limit, hit_distance) : limit;
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 161 + ray_number).x;
+  media_asked_by(path_is_bent(int(met_path_fetch(pixel).w + 0.5)) ? MEDIA_OF_TRANSMISSION : MEDIA_OF_GLOSSY);
   out_passed.rgb = media_transmittance(start, direction, limit, salt);
 }

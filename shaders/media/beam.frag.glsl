@@ -41,14 +41,16 @@ void main()
   }
   uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 47).x + floatBitsToUint(along_beam);
   // Back along the view: what is around the place, and what is left of its light at the eye.
+  media_asked_by(MEDIA_OF_CAMERA);
   media_crossings(position, -ray.direction);
   uint inside = media_at_start();
   vec3 scattered = media_scattered(inside, position, direction, -ray.direction, seed);
   if (!(max_component(scattered) > 0.0)) {
     discard;
   }
-  vec3 passing = media_transmittance_known(position, -ray.direction, along_view, seed)
-                 * media_transmittance(beam_start.xyz, direction, along_beam, seed + 1u);
+  vec3 passing = media_transmittance_known(position, -ray.direction, along_view, seed);
+  media_asked_by(MEDIA_OF_SHADOW);
+  passing *= media_transmittance(beam_start.xyz, direction, along_beam, seed + 1u);
   vec3 light = beam_flux.rgb * scattered * passing * (tent / max(sqrt(sine_squared), LEAST_SINE));
   out_volume = vec4((is_finite(light.x) && is_finite(light.y) && is_finite(light.z)) ? light : vec3(0.0), 0.0);
 }

@@ -141,10 +141,10 @@ void bins_add(uint inside, vec3 origin, vec3 direction, float from, float to, in
   vec3 extinction;
 #ifdef MEDIA_GRIDS
   float middle = from + (to - from) * media_random(seed);
-  extinction = media_depth(inside, origin, direction, from, to, seed) / (to - from);
+  extinction = media_depth(inside, origin, direction, from, to) / (to - from);
 #else
   float middle = from;
-  extinction = media_depth(inside, origin, direction, 0.0, 1.0, seed);
+  extinction = media_depth(inside, origin, direction, 0.0, 1.0);
 #endif
   vec3 scattering;
   vec3 emission;
@@ -199,6 +199,7 @@ void media_bins(vec3 origin, vec3 direction, float limit, inout uint seed)
   uint start = media_at_start();
   int left = 0;
 #ifdef MEDIA_GRIDS
+  media_turn_by(seed);
   uint around = start;
   float before = 0.0;
   for (int i = 0; i < media_intervals() && before < limit; i++) {

@@ -22,6 +22,22 @@ struct Crossings {
 // Of the ray that was asked for last. Not a parameter: compilers copy arrays for each call, and take long over it.
 Crossings crossings;
 
+// Which rays are asked about. MEDIA_APART: some media are seen by a part of them alone (the object's ray visibility).
+// `media_table` lists those that each kind of ray sees, 15 bits in each of two numbers, before its first row's last texel.
+#define MEDIA_OF_CAMERA 0
+#define MEDIA_OF_SHADOW 1
+#define MEDIA_OF_DIFFUSE 2
+#define MEDIA_OF_GLOSSY 3
+#define MEDIA_OF_TRANSMISSION 4
+#define MEDIA_OF_VOLUME 5
+#ifdef MEDIA_APART
+int media_ray = MEDIA_OF_SHADOW;
+uint media_seen;
+#define media_asked_by(kind) media_ray = (kind)
+#else
+#define media_asked_by(kind)
+#endif
+
 // Two crossings that are one: into or out of the same medium at the same place.
 #define SAME_PLACE 1e-5
 
@@ -199,7 +215,13 @@ uint media_at_start()
     }
     seen |= bit;
   }
-  return inside | (crossings.dropped & ~seen);
+  inside |= crossings.dropped & ~seen;
+#ifdef MEDIA_APART
+  vec4 listed = media_table_fetch(ivec2(2046 - media_ray, 0));
+  media_seen = uint(listed.x) | (uint(listed.y) << 15u);
+  inside &= media_seen;
+#endif
+  return inside;
 }
 
 // A ray is a row of intervals between crossings.
@@ -218,10 +240,11 @@ float media_until(int i, float limit)
 // Media behind interval i, which lies in `inside`.
 uint media_behind(int i, uint inside)
 {
-  if (i >= crossings.count) {
-    return inside ^ crossings.dropped;
-  }
   int crossing = crossings.medium[min(i, MOST_CROSSINGS - 1)];
-  uint bit = 1u << uint(abs(crossing) - 1);
-  return (crossing > 0) ? (inside | bit) : (inside & ~bit);
+  uint bit = 1u << uint(max(abs(crossing), 1) - 1);
+  uint behind = (i >= crossings.count) ? (inside ^ crossings.dropped) : ((crossing > 0) ? (inside | bit) : (inside & ~bit));
+#ifdef MEDIA_APART
+  behind &= media_seen;
+#endif
+  return behind;
 }

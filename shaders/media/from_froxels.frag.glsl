@@ -63,6 +63,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
   uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 49).x;
+  media_asked_by(MEDIA_OF_CAMERA);
   media_bins(ray.origin, ray.direction, ray.limit, seed);
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;

@@ -14,6 +14,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
   uint seed = roll_of(ivec2(0), film_view.sample_index, film_view.seed, 46).x;
+  media_asked_by(MEDIA_OF_CAMERA);
   media_bins(ray.origin, ray.direction, ray.limit, seed);
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;

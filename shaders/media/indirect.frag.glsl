@@ -198,6 +198,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       continue;
     }
     vec3 passed = weight * stop_sends(stop, way, lobe, seed);
+    media_asked_by((stop.inside == 0u) ? MEDIA_OF_DIFFUSE : MEDIA_OF_VOLUME);
     media_bins(from, way, limit, seed);
     bool in_media = bins.total > 0.0 && bins.count > 0;
     bool at_surface = hit.x >= 0;
@@ -331,6 +332,7 @@ Start start_at(vec3 position, vec3 onwards)
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
 Start on_ray(ViewRay ray, int number, vec2 ask_turn, float v, inout uint seed)
 {
+  media_asked_by(MEDIA_OF_CAMERA);
   media_bins(ray.origin, ray.direction, ray.limit, seed);
   Start start = start_at(ray.origin, -ray.direction);
   if (!(bins.total > 0.0) || bins.count == 0) {
@@ -378,6 +380,7 @@ void main()
     return;
   }
   Start start = start_at(ray.origin + away * ray.direction, -ray.direction);
+  media_asked_by(MEDIA_OF_CAMERA);
   media_crossings(start.stop.position, ray.direction);
   start.stop.inside = media_at_start();
   if (start.stop.inside == 0u) {

@@ -19,6 +19,7 @@ void main()
   ivec2 size = coarse_direct_size();
   ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 45).x;
+  media_asked_by(MEDIA_OF_CAMERA);
   vec3 passing = media_transmittance(ray.origin, ray.direction, ray.limit, salt);
   float opacity = 1.0 - dot(passing, vec3(1.0 / 3.0));
   float own = min(ray.limit, 1e18);

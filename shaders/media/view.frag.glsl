@@ -19,6 +19,7 @@ void main()
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 41).x;
   vec3 through = exp(-min(around_eye.rgb * ray.limit, vec3(1e30)));
+  media_asked_by(MEDIA_OF_CAMERA);
   through *= media_transmittance(ray.origin, ray.direction, ray.limit, salt);
   out_through = vec4(through, ray.hit ? 1.0 : 0.0);
 }

@@ -26,6 +26,19 @@ def test_a_slab_absorbs_by_beer_and_lambert(stage):
     assert seen[1, 1, :3] == pytest.approx(2.0, rel=1e-6)
 
 
+@pytest.mark.parametrize("rays", ["camera", "shadow"])
+def test_media_take_light_of_the_rays_that_see_them_alone(stage, rays):
+    """A slab above a lit floor, on both legs of the light's way, then on one."""
+    stage.camera_above()
+    stage.floor()
+    stage.light("SUN", (0, 0, 5), energy=np.pi)
+    slab = box(stage, absorber(stage, (0.5, 0.5, 0.5)), (-2, -2, 1), (2, 2, 2))
+    stage.scene.candela.slot_indirect = "OFF"
+    both = stage.render(size=(8, 8))["combined"][4, 4, 0]
+    setattr(slab, f"visible_{rays}", False)
+    assert stage.render(size=(8, 8))["combined"][4, 4, 0] == pytest.approx(both * np.exp(0.5), rel=1e-3)
+
+
 def test_nested_and_overlapping_media_add_their_coefficients(stage):
     stage.camera_above()
     glowing_floor(stage)
@@ -273,6 +286,9 @@ def test_fog_fades_what_a_mirror_shows(stage):
     seen = stage.render(4, size=(16, 16), bounces=1)["combined"]
     assert seen[8, 8, :3] == pytest.approx(2 * np.exp(-2 * np.array([0.8, 0.5, 0.1])), rel=0.01)
     assert seen[1, 1, :3] == pytest.approx(2.0, rel=0.01)
+    bpy.context.scene.objects[-1].visible_glossy = False
+    seen = stage.render(4, size=(16, 16), bounces=1)["combined"]
+    assert seen[8, 8, :3] == pytest.approx(2 * np.exp([-0.8, -0.5, -0.1]), rel=0.01)
 
 
 PHASE = passes.fullscreen_program(
@@ -415,6 +431,43 @@ def test_a_grid_of_any_numbers_gives_a_finite_picture(stage, tmp_path):
     seen = stage.render(2, size=(8, 8))
     assert seen["combined"][4, 4, 0] > 0.05
     assert seen["volume_direct"].max() > 0
+
+
+def voxels(stage, tmp_path, values, material, side=0.25):
+    """An OpenVDB object of these densities, its middle in the origin."""
+    vdb = openvdb()
+    grid = vdb.FloatGrid()
+    grid.name = "density"
+    grid.copyFromArray(values, ijk=tuple(-n // 2 for n in values.shape))
+    grid.transform = vdb.createLinearTransform(voxelSize=side)
+    vdb.write(str(tmp_path / "voxels.vdb"), [grid])
+    cloud = bpy.data.volumes.new("cloud")
+    cloud.filepath = str(tmp_path / "voxels.vdb")
+    cloud.materials.append(material)
+    return stage.link("cloud", cloud)
+
+
+def test_a_wall_of_one_voxel_leaks_nothing(stage, tmp_path):
+    """Optical depth 25; neither the camera nor the lamp sees through it."""
+    values = np.full((16, 16, 16), 1e-4, np.float32)
+    values[..., 7] = 100.0
+    wall = volume(stage, "ShaderNodeVolumePrincipled", Density=1.0, Color=(0, 0, 0, 1))
+    cloud = voxels(stage, tmp_path, values, wall)
+    stage.camera_above()
+    stage.floor(z=-3.0)
+    stage.light("SUN", (0, 0, 5), (0.3, 0.2, 0), energy=np.pi)
+    stage.scene.candela.slot_indirect = stage.scene.candela.slot_volume = "OFF"
+    assert stage.render(4, size=(12, 12))["combined"][3:9, 3:9, 0].max() < 1e-8
+    cloud.visible_camera = False
+    assert stage.render(4, size=(12, 12))["combined"][5:7, 5:7, 0].max() < 1e-8
+
+
+def test_a_volume_object_whose_material_reads_no_grid_is_not_drawn(stage, tmp_path):
+    even = volume(stage, "ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=1.0)
+    voxels(stage, tmp_path, np.ones((4, 4, 4), np.float32), even)
+    stage.camera_above()
+    glowing_floor(stage)
+    assert stage.render(size=(8, 8))["combined"][4, 4, 0] == pytest.approx(2.0, rel=1e-5)
 
 
 @pytest.mark.slow
