@@ -29,7 +29,7 @@ SCENES = ("window_interior", "cornell_box", "sky_courtyard")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="+", default=list(SCENES), help="sample files, or paths of .blend files")
+    parser.add_argument("--scenes", nargs="+", default=list(SCENES), help="sample files, foggy rooms of `bench media`, or paths of .blend files")
     parser.add_argument("--samples", type=int, nargs="+", default=[1, 16])
     parser.add_argument("--frames", type=int, default=FRAMES)
     parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")
@@ -58,12 +58,11 @@ def measured(name: str, options: argparse.Namespace):
 
     from addon.compare.reference import reference, render_passes
 
-    path = Path(name) if name.endswith(".blend") else ROOT / "sample_blends" / f"{name}.blend"
     size = tuple(int(edge) for edge in options.size.split("x"))
     entrants = [("Candela", "CANDELA", n, ()) for n in options.samples]
     if not options.no_peers:
         entrants += [("Cycles, denoised", "CYCLES", 4, (("use_denoising", True),)), ("EEVEE", "BLENDER_EEVEE", 16, ())]
-    bpy.ops.wm.open_mainfile(filepath=str(path))
+    shown_as = opened(name)
     scene = bpy.context.scene
     start = scene.camera.matrix_world.copy()
     truths = [
@@ -78,7 +77,22 @@ def measured(name: str, options: argparse.Namespace):
             shown = render_passes(scene, engine, samples, 1, size=size, extra=settings).images["combined"][..., :3]
             errors.append(levels(shown, exposure) - levels(truths[number], exposure))
         grain, boiling, jitter = figures(np.array(errors))
-        yield [path.stem.replace("_", " "), label, str(samples), f"{grain:.1f}", f"{boiling:.2f}", f"{jitter:.2f}"]
+        yield [shown_as, label, str(samples), f"{grain:.1f}", f"{boiling:.2f}", f"{jitter:.2f}"]
+
+
+def opened(name: str) -> str:
+    """Open a sample file, a path, or a foggy room of media_scenes.py; what the page calls it."""
+    import bpy
+
+    from bench import media_scenes
+
+    if name in media_scenes.ROOMS:
+        media_scenes.begin()
+        media_scenes.ROOMS[name][0]()
+        return name
+    path = Path(name) if name.endswith(".blend") else ROOT / "sample_blends" / f"{name}.blend"
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return path.stem.replace("_", " ")
 
 
 def moved(scene, start, frames: int, size: tuple[int, int]):

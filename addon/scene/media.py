@@ -155,7 +155,7 @@ def filled(snapshot: Snapshot, compiled: list[CompiledMaterial], origin: np.ndar
             continue
         read = {attribute.name for attribute in compile_volume(one.object_name, graph, snapshot.images).attributes}
         if read.isdisjoint(volume.grids):
-            text = "its material reads none of its grids, so that it is not drawn, as in Cycles: name one in an Attribute node."
+            text = "its material reads none of its grids: it is not drawn, as in Cycles. Name one in an Attribute node."
             notes.append(Note(f"Object '{one.object_name}'", text))
             continue
         matrix = one.matrix[:3].copy()
