@@ -29,7 +29,9 @@ SCENES = ("window_interior", "cornell_box", "sky_courtyard")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="+", default=list(SCENES), help="sample files, foggy rooms of `bench media`, or paths of .blend files")
+    parser.add_argument(
+        "--scenes", nargs="+", default=list(SCENES), help="samples, rooms of `bench media`, .blend files"
+    )
     parser.add_argument("--samples", type=int, nargs="+", default=[1, 16])
     parser.add_argument("--frames", type=int, default=FRAMES)
     parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")

@@ -63,6 +63,9 @@ BOX = np.array([
 ])  # fmt: skip
 
 
+ALL_RAYS = Visibility()
+
+
 @dataclass(frozen=True, eq=False)
 class Filled:
     """What fills one volume. `corners`: (T, 3, 3) of its boundary relative to the render origin; None: all space."""
@@ -76,7 +79,7 @@ class Filled:
     volume: Volume | None = None
     instance: Instance | None = None
     density: float = 1.0  # factor of all coefficients
-    visibility: Visibility = Visibility()  # which rays see it
+    visibility: Visibility = ALL_RAYS  # which rays see it
 
     @property
     def varies(self) -> bool:
