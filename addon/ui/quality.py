@@ -1,11 +1,10 @@
-"""Quality presets, as Blender's own: the four that come with Candela, and those that the artist adds.
+"""Quality presets, as Blender's own: the six that come with Candela, and those that the artist adds.
 
-A preset holds the scene's samples and every parameter of the techniques: what costs time for less error, and not what
-is rendered (slots, tree, seed, bounces).
+A preset holds the scene's samples and parameters of the techniques: what costs time for less error, and not what is
+rendered (slots, tree, seed, bounces). What it does not name gets its default. Its first line is its tooltip.
 """
 
-from __future__ import annotations
-
+import ast
 from pathlib import Path
 
 import bpy
@@ -37,14 +36,42 @@ class CANDELA_OT_quality_preset_add(AddPresetBase, bpy.types.Operator):
     )
 
 
+class CANDELA_OT_quality_preset(bpy.types.Operator):
+    """Use a quality preset"""
+
+    bl_idname = "candela.quality_preset"
+    bl_label = "Use Quality Preset"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, context, properties):
+        return about(Path(properties.filepath)) or "Set what this preset holds"
+
+    def execute(self, context):
+        own = context.scene.candela
+        for name in CANDELA_OT_quality_preset_add.preset_values:
+            own.property_unset(name.removeprefix("candela."))
+        return bpy.ops.script.execute_preset(filepath=self.filepath, menu_idname=CANDELA_PT_quality_presets.__name__)
+
+
+def about(path: Path) -> str:
+    """What a preset's file says of itself, without the full stop; empty if it says nothing or cannot be read."""
+    try:
+        return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").rstrip(".")
+    except (OSError, SyntaxError, ValueError):
+        return ""
+
+
 class CANDELA_PT_quality_presets(PresetPanel, bpy.types.Panel):
     bl_label = "Quality Presets"
     preset_subdir = FOLDER
-    preset_operator = "script.execute_preset"
-    preset_add_operator = "candela.quality_preset_add"
+    preset_operator = CANDELA_OT_quality_preset.bl_idname
+    preset_add_operator = CANDELA_OT_quality_preset_add.bl_idname
 
 
-_CLASSES = (CANDELA_OT_quality_preset_add, CANDELA_PT_quality_presets)
+_CLASSES = (CANDELA_OT_quality_preset_add, CANDELA_OT_quality_preset, CANDELA_PT_quality_presets)
 
 
 def register() -> None:

@@ -10,7 +10,8 @@ from addon.frame.technique import SCENE, identifier
 from addon.techniques import REGISTRY
 from addon.ui import quality
 
-NAMES = ("Draft", "Fast", "Balanced", "Fine")
+NAMES = ("Draft", "Fast", "Balanced", "Fine")  # from coarse to fine
+KINDS = ("Night", "Product")  # of scenes
 
 
 def files():
@@ -21,9 +22,7 @@ def files():
 
 
 def values(scene, name):
-    assert bpy.ops.script.execute_preset(filepath=str(files()[name]), menu_idname="CANDELA_PT_quality_presets") == {
-        "FINISHED"
-    }
+    assert bpy.ops.candela.quality_preset(filepath=str(files()[name])) == {"FINISHED"}
     return set_by_presets(scene)
 
 
@@ -47,14 +46,14 @@ def declared():
 def written(path):
     """name -> value of a preset's file, read without running it."""
     found = {}
-    for line in ast.parse(path.read_text(encoding="utf-8")).body[2:]:
+    for line in ast.parse(path.read_text(encoding="utf-8")).body[3:]:
         (target,) = line.targets
         assert target.value.id == "candela" and target.attr not in found
         found[target.attr] = ast.literal_eval(line.value)
     return found
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", (*NAMES, *KINDS))
 def test_presets_set_what_techniques_declare_to_values_that_they_allow(name):
     params = declared()
     for own, value in written(quality.Path(quality.PATH, "presets", quality.FOLDER) / f"{name}.py").items():
@@ -74,7 +73,7 @@ def scene(registered, empty_scene):
 
 
 def test_presets_come_with_candela(scene):
-    assert set(NAMES) <= set(files())
+    assert {*NAMES, *KINDS} <= set(files())
 
 
 def test_finer_presets_take_more_of_everything(scene):
@@ -98,6 +97,19 @@ def test_fast_presets_have_no_soft_maps_nor_near_bounces_and_fine_has_finer_maps
 def test_balanced_is_what_a_new_scene_has(scene):
     new = set_by_presets(scene)
     assert values(scene, "Balanced") == new
+
+
+def test_what_a_preset_does_not_name_gets_its_default(scene):
+    values(scene, "Night")
+    assert scene.candela.direct_light_lights_per_sample == 48
+    values(scene, "Product")
+    assert scene.candela.direct_light_lights_per_sample == 16 and scene.candela.traced_refraction_interfaces == 16
+
+
+def test_each_preset_says_in_its_tooltip_what_it_is_for(scene):
+    said = [quality.about(files()[name]) for name in (*NAMES, *KINDS)]
+    assert all(20 < len(text) < 130 for text in said) and len(set(said)) == len(said)
+    assert quality.about(quality.Path("nowhere.py")) == ""
 
 
 def test_a_preset_of_the_artist_may_hold_every_parameter(scene):

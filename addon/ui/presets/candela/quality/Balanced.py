@@ -1,3 +1,5 @@
+"""What a new scene has: 64 samples."""
+
 import bpy
 
 candela = bpy.context.scene.candela

@@ -1,3 +1,5 @@
+"""One sample with the lowest settings: to find light and composition."""
+
 import bpy
 
 candela = bpy.context.scene.candela

@@ -1,3 +1,5 @@
+"""16 samples with coarser shadow maps and fewer virtual lights: pictures to talk about, long animations."""
+
 import bpy
 
 candela = bpy.context.scene.candela

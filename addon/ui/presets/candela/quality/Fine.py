@@ -1,3 +1,5 @@
+"""512 samples with the finest shadow maps and most virtual lights: final pictures without visible noise."""
+
 import bpy
 
 candela = bpy.context.scene.candela
