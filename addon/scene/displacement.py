@@ -44,6 +44,7 @@ from ..snapshot.scene import Instance, Mesh, Note, Snapshot
 from .geometry import TEXELS_PER_INSTANCE, attribute_rows, corner_attribute, instance_facts
 from .materials import EVERY_DEFINES, MATERIAL_SCENE, MaterialSet, caster_like
 from .shells import corner_list
+from .subdivision import subdivided
 
 OWNER = "relief"  # the technique whose parameters these are
 AUTO, BUMP, MESH, RELIEF = "AUTO", "BUMP", "MESH", "RELIEF"
@@ -55,6 +56,8 @@ SEARCHES = {FALSE_POSITION: 0, INTERVAL: 1, BISECTION: 2}
 
 SAMPLES = 1 << 14  # points of a kind of instance and material at which heights are looked at
 COARSE = 0.04  # of the range of heights, see above
+FEW_PIECES, MOST_PIECES = 500, 50_000  # triangles of a mesh that is cut for what scatters light below its surface
+FINE = 0.01  # of the range of heights, by which such pieces err at most
 MARGIN = 0.02  # of the range, above and below what was found
 THINNEST = 5e-5  # of the extent of a mesh
 APART = 8  # instances of a kind whose range is looked at
@@ -111,6 +114,8 @@ class Displacement:
     def __init__(self):
         self._measured: dict[object, Measured] = {}
         self._meshes: dict[object, Mesh] = {}
+        self._pieces: dict[object, tuple[Measured, Mesh]] = {}
+        self._cut: set[int] = set()  # materials whose meshes are cut into pieces that carry their heights
         self._instances: dict[int, tuple[Instance, Instance]] = {}
         self._lists: dict[int, tuple[object, images.Image]] = {}
         self._scene: Block | None = None
@@ -125,10 +130,15 @@ class Displacement:
         self.modes, self.errors, self.notes = {}, {}, ()
         kinds = self._kinds(snapshot, set(asked))
         if not kinds:
-            self._measured, self._meshes, self._instances, self._lists = {}, {}, {}, {}
+            self._measured, self._meshes, self._instances, self._lists, self._pieces = {}, {}, {}, {}, {}
             return snapshot
         measured = self._measure(snapshot, materials, kinds, set(asked))
         self._decide(snapshot, materials, asked, measured)
+        if self._cut:
+            before = self._measured
+            snapshot = self._with_pieces(snapshot, materials, kinds, measured)
+            measured = self._measure(snapshot, materials, kinds, set(asked))
+            self._measured = before | self._measured
         return self._applied(snapshot, materials, kinds, measured)
 
     def release(self) -> None:
@@ -224,12 +234,19 @@ class Displacement:
             return images.read(target.colors[0]).reshape(-1, 4)[:count].astype(np.float64)
 
     def _decide(self, snapshot: Snapshot, materials: MaterialSet, asked: dict[int, str], measured: dict) -> None:
-        notes = []
+        notes, self._cut = [], set()
         for (_, k), one in measured.items():
             self.errors[k] = max(self.errors.get(k, 0.0), one.error)
         for k, error in self.errors.items():
             compiled, mode = materials.compiled[k], asked[k]
-            if mode == AUTO:
+            if mode != MESH and compiled.scatter > 0.0:  # light enters and leaves where triangles are
+                if error > COARSE:
+                    text = "Its mesh is too coarse for its displacement and is cut finer, since light scatters below it;"
+                    text += " Cycles moves only the vertices there are. Subdivide it, or choose Mesh, for its picture."
+                    notes.append(Note(f"Material '{compiled.name}'", text, compiled.name))
+                    self._cut.add(k)
+                mode = MESH
+            elif mode == AUTO:
                 mode = RELIEF if error > COARSE and compiled.along_normal else MESH
                 if mode == RELIEF:
                     text = "Its mesh is too coarse for its displacement and is drawn as relief, with all detail; Cycles"
@@ -248,6 +265,30 @@ class Displacement:
                 notes.append(Note(f"Material '{compiled.name}'", text, compiled.name))
             self.modes[k] = mode
         self.notes = tuple(notes)
+
+    def _with_pieces(self, snapshot: Snapshot, materials: MaterialSet, kinds, measured: dict) -> Snapshot:
+        """The snapshot with meshes of `_cut` subdivided until heights between vertices err by FINE at most, or there
+        are MOST_PIECES."""
+        meshes, kept = dict(snapshot.meshes), {}
+        for (kind, k), one in measured.items():
+            if k not in self._cut or one.error <= COARSE:
+                continue
+            mesh = snapshot.meshes[kind[0]]
+            key = (mesh.key, mesh.version, id(one))
+            made, error = mesh, one.error
+            if key in self._pieces:
+                made = self._pieces[key][1]
+                error = 0.0
+            while error > FINE and 4 * made.triangle_count <= MOST_PIECES:
+                made = replace(subdivided(made), version=next(_versions))
+                if made.triangle_count >= FEW_PIECES:
+                    own = made.triangle_materials(kind[1]) == k
+                    error = self._measured_of(materials, k, made, own, kinds[kind][:1]).error
+            kept[key] = (one, made)
+            if made.triangle_count > meshes[mesh.key].triangle_count:
+                meshes[mesh.key] = made
+        self._pieces = kept
+        return replace(snapshot, meshes=meshes)
 
     def _applied(self, snapshot: Snapshot, materials: MaterialSet, kinds, measured) -> Snapshot:
         self._change_programs(snapshot, materials, measured)

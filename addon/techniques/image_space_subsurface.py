@@ -50,7 +50,7 @@ from ..scene import acceleration
 from ..scene.materials import SCATTER_IMAGES
 from ..scene.scatter_points import RANGE, ROW, ScatterPoints
 from ..scene.view import VIEW
-from ..snapshot.scene import Note, Snapshot
+from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACES, draw_scatter
 from ..surfaces.scatter_means import ScatterMeans
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
@@ -191,11 +191,6 @@ class ImageSpaceSubsurface(Technique):
         self._materials = {k for k, material in enumerate(frame.materials.compiled) if material.scatter > 0.0}
         if not self._materials:
             return
-        for k in sorted(self._materials):
-            if frame.materials.in_shell(k):
-                text = "Light enters below its relief, at the mesh: choose Displacement: Mesh on a subdivided mesh."
-                name = frame.materials.compiled[k].name
-                frame.ledger.notes = (*frame.ledger.notes, Note(f"Material '{name}'", text, name))
         moved = self.points.update(frame, frame.settings.get(self, "points"))
         # What stands inside an object makes it thinner, too.
         met = frame.geometry.changes, frame.hierarchy("shadow").leaves.number

@@ -354,20 +354,28 @@ def test_an_open_sheet_is_the_same_on_either_side_and_as_in_cycles(stage, bend):
     assert pictures[0] == pytest.approx(shown(stage.render(64, engine="CYCLES")).mean(axis=(0, 1)), rel=0.06)
 
 
-def test_relief_over_wax_is_named(stage):
-    """Points in which light enters lie on the mesh below it."""
-    wax = scattering(stage, scale=0.3)
+@pytest.mark.slow
+def test_relief_over_wax_is_a_mesh_of_its_heights(stage):
+    """Light enters and leaves where triangles are: a coarse slab is cut as finely as its displacement asks for, and
+    looks as one that was fine before."""
+    wax = scattering(stage, scale=0.5)
     nodes, links = wax.node_tree.nodes, wax.node_tree.links
-    noise, displacement = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeDisplacement")
-    links.new(noise.outputs[0], displacement.inputs["Height"])
+    waves, displacement = nodes.new("ShaderNodeTexWave"), nodes.new("ShaderNodeDisplacement")
+    links.new(nodes.new("ShaderNodeTexCoord").outputs["Object"], waves.inputs["Vector"])
+    waves.inputs["Scale"].default_value, displacement.inputs["Scale"].default_value = 0.5, 0.3
+    links.new(waves.outputs["Fac"], displacement.inputs["Height"])
     output = next(one for one in nodes if one.type == "OUTPUT_MATERIAL")
     links.new(displacement.outputs[0], output.inputs["Displacement"])
     wax.displacement_method, wax.candela.relief_mode = "DISPLACEMENT", "RELIEF"
     slab(stage, wax, half=1.0)
-    stage.light("SUN")
+    body = stage.scene.objects[-1]
+    stage.light("SUN", turn=(0.6, 0, 0.4))
     stage.camera_above(1.0)
-    stage.render(1, (8, 8))
-    assert any(note.material == wax.name and "below its relief" in note.text for note in stage.ledger.notes)
+    coarse = shown(stage.render(4, (16, 16)))
+    assert any(note.material == wax.name and "cut finer" in note.text for note in stage.ledger.notes)
+    fine = body.modifiers.new("Subdivision", "SUBSURF")
+    fine.subdivision_type, fine.levels, fine.render_levels = "SIMPLE", 6, 6
+    assert coarse.mean(axis=(0, 1)) == pytest.approx(shown(stage.render(4, (16, 16))).mean(axis=(0, 1)), rel=0.03)
 
 
 def walked_through(paths, albedo, walks=200_000):
