@@ -14,7 +14,7 @@ from .pieces import farthest
 
 ROW = 64  # cells
 RUNS = 8  # points of the cloud for each cell
-TURN = 0.7  # cell sizes by which two opposite faces count as apart
+TURN = 2.0  # cell sizes by which two opposite faces count as apart: those that meet at an edge share no cell
 FEWEST_BEHIND = 0.125  # of an object's points, on the other side of a part that is nearly closed
 NEARLY = 0.1  # of a part's surface: a disc with the rim of its holes, up to which it counts as a body
 MOST_VOXELS = 64  # along an axis

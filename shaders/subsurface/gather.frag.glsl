@@ -33,12 +33,14 @@ void arriving_pixel(inout Arriving sum, ivec2 pixel, float translucency, vec3 we
 }
 
 // Mean of what arrives at pixels of the object within `extent`, by the profile in the window; taps on a spiral, denser inwards.
-// `beyond`: the share of the profile that lies outside of the picture.
+// `beyond`: the share of the profile that lies outside of the picture. `alike`: of those on the same side alone, by whose mean
+// walks are lit that leave there; where `walked` is not 0.
 Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, float object, float extent, float range,
-                    float pixel_size, float translucency, out vec3 beyond)
+                    float pixel_size, float translucency, float walked, out vec3 beyond, out Arriving alike)
 {
   Arriving sum;
   sum.direct = sum.indirect = sum.whole = vec3(0.0);
+  alike = sum;
   beyond = vec3(0.0);
   vec3 tangent;
   vec3 bitangent;
@@ -66,7 +68,12 @@ Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, flo
     }
     // The density of taps at r is 1 / ((r + inner) ratio).
     float weight = near_window(away, range) * (r + inner) * (r / max(away, 1e-20));
-    arriving_pixel(sum, pixel, translucency, profile_radial(profile, away) * weight);
+    vec3 weights = profile_radial(profile, away) * weight;
+    arriving_pixel(sum, pixel, translucency, weights);
+    if (walked > 0.0) {
+      float side = side_of_walk(octahedral_decode(surface_normal_fetch(pixel).zw), normal);
+      arriving_pixel(alike, pixel, translucency, weights * side);
+    }
   }
   beyond /= max(beyond + sum.whole, vec3(1e-20));
   return sum;
@@ -218,13 +225,16 @@ void main()
     float window = (kind == PROFILE_WALK) ? window_of_walks(object, width) : RANGE * object.z;
     float range = has_points ? window : 1e3 * reach;
     vec3 beyond;
-    Arriving near =
-        near_light(pixel, position, normal, profile, code, min(range, reach), range, width, translucency, beyond);
+    Arriving alike;
+    Arriving near = near_light(pixel, position, normal, profile, code, min(range, reach), range, width, translucency, walked,
+                               beyond, alike);
     vec3 found = step(vec3(1e-20), near.whole);
     direct = mix(own.direct, near.direct / max(near.whole, vec3(1e-20)), found);
     indirect = mix(own.indirect, near.indirect / max(near.whole, vec3(1e-20)), found);
-    out_near_direct = vec4(walked * leaves * direct, walked);
-    out_near_indirect = vec4(walked * leaves * indirect, walked);
+    vec3 known = step(vec3(1e-20), alike.whole);
+    vec3 per = vec3(1.0) / max(alike.whole, vec3(1e-20));
+    out_near_direct = vec4(walked * leaves * mix(own.direct, alike.direct * per, known), walked);
+    out_near_indirect = vec4(walked * leaves * mix(own.indirect, alike.indirect * per, known), walked);
     if (has_points && walked < 1.0) {
       vec3 inside = profile_near(profile, range);
       vec3 outside = max(vec3(1.0) - inside, vec3(0.0));

@@ -69,25 +69,14 @@ void main()
   sent_so_far = same_so_far = left_so_far = vec3(0.0);
   Below below = below_of(object.w, color.rgb, length_m.xyz);
   uvec3 roll = roll_of(texel, film_view.sample_index, film_view.seed, 239);
-  uvec3 salt1 = roll_of(texel >> 2, 0, film_view.seed, 241);
-  uvec3 salt2 = hash3(salt1);
-  uvec3 salt3 = hash3(salt2);
-  uvec3 salt4 = hash3(salt3);
-  uvec3 salt5 = hash3(salt4);
-  uvec3 salt6 = hash3(salt5);
-  uvec3 salt7 = hash3(salt6);
-  Even even;
-  even.scattered = salt3.xy;
-  even.polar = salt4.xy;
-  even.azimuth = salt5.xy;
   vec3 rest = vec3(0.0);
   vec3 by_cosine = vec3(0.0);
   for (int walk = 0; walk < walks; walk++) {
-    even.index = (film_view.sample_index * walks + walk) * 16 + (texel.x & 3) + 4 * (texel.y & 3);
-    vec2 u = vec2(shuffled(even.index, salt1.xy), shuffled(even.index, salt2.xy));
-    vec2 v = vec2(shuffled(even.index, salt6.xy), shuffled(even.index, salt7.xy));
+    Even even = even_of(texel, film_view.sample_index * walks + walk, 241);
+    uvec2 salt = hash3(even.more).xy;
+    vec2 v = vec2(shuffled(even.index, even.more.xy), shuffled(even.index, salt));
     vec3 view = cosine_direction(entered_normal, v);
-    vec3 direction = entry_direction(entered_normal, view, color.w, share.w, method == SCATTER_SKIN, u);
+    vec3 direction = entry_direction(entered_normal, view, color.w, share.w, method == SCATTER_SKIN, even_entry(even));
     vec3 before = sent_so_far;
     if (dot(direction, face) < 0.0) {
       rest += walk_below(below, start, direction, even, roll);

@@ -1,17 +1,31 @@
 // The mean of what walks bring over places of the object around, per channel within half a free path and a fraction of the
 // pixels' window: light from beyond the window changes over no less; of many samples less is asked, by the fourth root of
-// their number, so that what it blurs goes with them (lighting/walked_light.py).
+// their number, so that what it blurs goes with them (lighting/walked_light.py). Pixels come in pairs, one on either side, so that
+// light which rises or falls evenly stays as it is, at edges, too.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "subsurface/image.glsl"
 #include "subsurface/profile.glsl"
 #include "subsurface/walked.glsl"
 
-#define TAPS 24
+#define PAIRS 12
 #define GOLDEN 2.39996323
 #define PATHS 0.5     // free paths, and
-#define PIXELS 1.2    // or widths of a pixel
+#define PIXELS 0.6     // or widths of a pixel
 #define WINDOWS 0.4   // windows of pixels: standard deviation of the mean's weights
+
+// Per channel; 0 where the pixel shows another object or another side of it.
+vec3 tap_weight(ivec2 pixel, float object, vec3 position, vec3 normal, vec3 face, float reach, vec3 narrower)
+{
+  if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, surface_position_size()))
+      || !(walked_near_fetch(pixel).w > 0.0) || floor(scatter_share_fetch(pixel).w * 0.25) != object) {
+    return vec3(0.0);
+  }
+  vec3 path = surface_position_fetch(pixel).xyz - position;
+  vec3 facing = octahedral_decode(surface_normal_fetch(pixel).xy);
+  float same = smoothstep(0.7, 0.95, dot(facing, normal)) * step(abs(dot(path, face)), reach);
+  return same * exp(-dot(path, path) * narrower);
+}
 
 void main()
 {
@@ -44,25 +58,22 @@ void main()
   vec3 indirect = out_indirect.rgb;
   vec3 left = near.rgb;
   vec3 whole = vec3(1.0);
-  for (int k = 0; k < TAPS; k++) {
-    float r = widest * sqrt(-2.0 * log(1.0 - 0.97 * (float(k) + shift) / float(TAPS)));
+  for (int k = 0; k < PAIRS; k++) {
+    float r = widest * sqrt(-2.0 * log(1.0 - 0.97 * (float(k) + shift) / float(PAIRS)));
     float angle = turn + GOLDEN * float(k);
     ivec2 other;
     if (!pixel_seen(position + r * (cos(angle) * tangent + sin(angle) * bitangent), other) || all(equal(other, pixel))) {
       continue;
     }
-    vec4 there = walked_near_fetch(other);
-    if (there.w <= 0.0 || floor(scatter_share_fetch(other).w * 0.25) != object) {
-      continue;
+    ivec2 across = 2 * pixel - other;
+    vec3 weight = min(tap_weight(other, object, position, normal, face, widest + pixel_size, narrower),
+                      tap_weight(across, object, position, normal, face, widest + pixel_size, narrower));
+    if (weight.x + weight.y + weight.z > 0.0) {
+      direct += weight * (walked_direct_fetch(other).rgb + walked_direct_fetch(across).rgb);
+      indirect += weight * (walked_indirect_fetch(other).rgb + walked_indirect_fetch(across).rgb);
+      left += weight * (walked_near_fetch(other).rgb + walked_near_fetch(across).rgb);
+      whole += 2.0 * weight;
     }
-    vec3 path = surface_position_fetch(other).xyz - position;
-    vec3 facing = octahedral_decode(surface_normal_fetch(other).xy);
-    float same = smoothstep(0.7, 0.95, dot(facing, normal)) * step(abs(dot(path, face)), widest + pixel_size);
-    vec3 weight = same * exp(-dot(path, path) * narrower);
-    direct += weight * walked_direct_fetch(other).rgb;
-    indirect += weight * walked_indirect_fetch(other).rgb;
-    left += weight * there.rgb;
-    whole += weight;
   }
   out_direct.rgb = direct / whole;
   out_indirect.rgb = indirect / whole;

@@ -31,7 +31,7 @@ vec4 voxels;
 void walk_leaves(vec3 weight, vec3 place, vec3 facing, vec2 u)
 {
   ivec2 shown_at;
-  float same = smoothstep(0.4, 0.9, dot(facing, entered_normal)) * (pixel_seen(place, shown_at) ? 1.0 : 0.0);
+  float same = side_of_walk(facing, entered_normal) * (pixel_seen(place, shown_at) ? 1.0 : 0.0);
   float near = near_window(distance(place, entered_at), pixels_range) * same;
   walked_so_far.near += weight * near;
   weight *= 1.0 - near;
@@ -89,22 +89,10 @@ void main()
   pixels_range = range;
   points_spacing = object.z;
   translucent = spread_entry_fetch(pixel).w;
-  // Pixels of a block of four by four share a sequence, so that their mean is as even as that of one pixel's walks.
-  uvec3 salt1 = roll_of(pixel >> 2, 0, film_view.seed, 227);
-  uvec3 salt2 = hash3(salt1);
-  uvec3 salt3 = hash3(salt2);
-  uvec3 salt4 = hash3(salt3);
-  uvec3 salt5 = hash3(salt4);
-  Even even;
-  even.scattered = salt3.xy;
-  even.polar = salt4.xy;
-  even.azimuth = salt5.xy;
-  int in_block = (pixel.x & 3) + 4 * (pixel.y & 3);
   vec3 rest = vec3(0.0);
   for (int walk = 0; walk < walks; walk++) {
-    even.index = (film_view.sample_index * walks + walk) * 16 + in_block;
-    vec2 u = vec2(shuffled(even.index, salt1.xy), shuffled(even.index, salt2.xy));
-    vec3 direction = entry_direction(normal, view, entry.x, entry.y, method == SCATTER_SKIN, u);
+    Even even = even_of(pixel, film_view.sample_index * walks + walk, 227);
+    vec3 direction = entry_direction(normal, view, entry.x, entry.y, method == SCATTER_SKIN, even_entry(even));
     if (dot(direction, face) >= 0.0) {
       continue;
     }

@@ -22,13 +22,41 @@ Below below_of(float instance, vec3 color, vec3 length_m)
   return below;
 }
 
-// First numbers of walks, which share a sequence with others, so that their mean is even.
+// First numbers of walks. Those of a block of four by four texels share a sequence, so that their mean is as even as that of
+// one texel's walks.
 struct Even {
   int index;
-  uvec2 scattered;  // salts
+  uvec2 entry1;  // salts
+  uvec2 entry2;
+  uvec2 scattered;
   uvec2 polar;
   uvec2 azimuth;
+  uvec3 more;
 };
+
+// `number`: of the walk, among all of this texel's.
+Even even_of(ivec2 texel, int number, int stream)
+{
+  Even even;
+  even.index = number * 16 + (texel.x & 3) + 4 * (texel.y & 3);
+  uvec3 salt = roll_of(texel >> 2, 0, film_view.seed, stream);
+  even.entry1 = salt.xy;
+  salt = hash3(salt);
+  even.entry2 = salt.xy;
+  salt = hash3(salt);
+  even.scattered = salt.xy;
+  salt = hash3(salt);
+  even.polar = salt.xy;
+  salt = hash3(salt);
+  even.azimuth = salt.xy;
+  even.more = hash3(salt);
+  return even;
+}
+
+vec2 even_entry(Even even)
+{
+  return vec2(shuffled(even.index, even.entry1), shuffled(even.index, even.entry2));
+}
 
 // Walks on from `origin` along `direction` and returns what is left of the light after STEPS.
 vec3 walk_below(Below below, vec3 origin, vec3 direction, Even even, inout uvec3 roll)

@@ -54,3 +54,9 @@ float walked_part(Profile profile, vec4 object, float width, float depth)
   float fine = clamp(FINE * max_component(away) / object.z, COARSEST, 1.0);
   return beyond * (1.0 - smoothstep(DEEP * fine, DEEPER * fine, depth / max_component(away)));
 }
+
+// Whether what leaves a surface that faces along `facing` counts as on the side on which a walk entered.
+float side_of_walk(vec3 facing, vec3 entered)
+{
+  return smoothstep(0.4, 0.9, dot(facing, entered));
+}

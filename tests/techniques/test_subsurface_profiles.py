@@ -6,6 +6,7 @@ import pytest
 from addon.gfx import context, images, passes
 from addon.kernels import diffusion
 from addon.kernels.diffusion import Medium
+from addon.scene.scatter_surface import Surface
 
 trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
 
@@ -139,3 +140,17 @@ def test_the_shader_has_the_same_profile(registered, kind, albedo):
         expected = trapezoid((1 - t * t) ** 2 * density, t * r[k])
         assert found[k, 1] == pytest.approx(expected, rel=0.02)
     assert np.diff(found[:, 1]).min() > 0.0
+
+
+def test_cells_of_a_box_share_no_edge():
+    """Light of one face that meets another at an edge is no light of the other."""
+    places = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    triangles = np.array([part for a, b, c, d in faces for part in ((a, b, c), (a, c, d))])
+    corners = places[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    box = Surface(
+        corners, np.repeat(normals[:, None], 3, axis=1), np.full(12, 0.5), np.zeros((12, 3, 2)), np.zeros(12, int), 1.0, 1.0
+    )
+    face = box.cells(256)[2]
+    assert np.einsum("crx,cx->cr", face, face[:, 0]).min() > 0.99
