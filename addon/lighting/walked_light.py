@@ -99,7 +99,10 @@ def walk(
             **{name: image for name, image in zip(PICTURE, picture) if name not in ("spread_entry", "scatter_walk")},
         },
         blocks={"film_view": frame.view_block},
-        constants={"first_object": points.first_object, "narrowness": (max(frame.settings.samples, FEW_WALKS) / FEW_WALKS) ** -0.25},
+        constants={
+            "first_object": points.first_object,
+            "narrowness": (max(frame.settings.samples, FEW_WALKS) / FEW_WALKS) ** -0.25,
+        },
     )  # fmt: skip
     for image in made:
         images.pool.give(image)

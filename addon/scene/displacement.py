@@ -241,8 +241,10 @@ class Displacement:
             compiled, mode = materials.compiled[k], asked[k]
             if mode != MESH and compiled.scatter > 0.0:  # light enters and leaves where triangles are
                 if error > COARSE:
-                    text = "Its mesh is too coarse for its displacement and is cut finer, since light scatters below it;"
-                    text += " Cycles moves only the vertices there are. Subdivide it, or choose Mesh, for its picture."
+                    text = "Its mesh is too coarse for its displacement and is cut finer, since light scatters below"
+                    text += (
+                        " it; Cycles moves only the vertices there are. Subdivide it, or choose Mesh, for its picture."
+                    )
                     notes.append(Note(f"Material '{compiled.name}'", text, compiled.name))
                     self._cut.add(k)
                 mode = MESH

@@ -150,7 +150,13 @@ def test_cells_of_a_box_share_no_edge():
     corners = places[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     box = Surface(
-        corners, np.repeat(normals[:, None], 3, axis=1), np.full(12, 0.5), np.zeros((12, 3, 2)), np.zeros(12, int), 1.0, 1.0
+        corners,
+        np.repeat(normals[:, None], 3, axis=1),
+        np.full(12, 0.5),
+        np.zeros((12, 3, 2)),
+        np.zeros(12, int),
+        1.0,
+        1.0,
     )
     face = box.cells(256)[2]
     assert np.einsum("crx,cx->cr", face, face[:, 0]).min() > 0.99
