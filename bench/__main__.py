@@ -9,6 +9,7 @@ import sys
 from bench import (
     again,
     ages,
+    auto,
     beside,
     bright,
     cases,
@@ -54,6 +55,7 @@ from bench import (
 VERBS = {
     "run": run,
     "again": again,
+    "auto": auto,
     "beside": beside,
     "bright": bright,
     "growth": growth,

@@ -460,6 +460,18 @@ class Hits:
         with."""
         return self._owners_of(frame, hierarchy), hierarchy.first_leaf - _leaves_of_rows(hierarchy)
 
+    def numbered(self, frame: Frame, instance: Instance) -> list[tuple[int, int, np.ndarray]]:
+        """Of each material of an instance: which, the number of its first triangle, and which triangles those are."""
+        self._number(frame)
+        mesh = frame.geometry.placed[1][instance.mesh]
+        of_triangle = mesh.triangle_materials(instance.materials)
+        return [
+            (material, kind.first, np.flatnonzero(of_triangle == material))
+            for material, kinds in self._kinds.items()
+            for kind in kinds
+            if kind.mesh is mesh and kind.slots == instance.materials
+        ]
+
     # What stands behind triangles -----------------------------------------------------------------------------------
 
     def _owners_of(self, frame: Frame, hierarchy: Hierarchy) -> images.Image:

@@ -13,6 +13,7 @@ from .denoise import Denoise
 from .depth_complexity import DepthComplexity
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
+from .edit_heat import EditHeat
 from .emissive_light import EmissiveLight
 from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
@@ -83,6 +84,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     Denoise,
     TemporalGlare,
     EyeModel,
+    EditHeat,
 )
 
 

@@ -14,9 +14,10 @@ never change, and pixels outside of all regions are what they are without this t
 | geodesic distances, once per change | a shortest-path search per region and constraint, as far as regions reach |
 
 Bias: directions are exact for the view in which a constraint was made; in other views they turn along with what the
-surface mirrors there. Surfaces that are seen in a mirror or through glass are shown without their edits. A mirrored ray
-that an edit sends into its own closed object begins where it leaves that. Edits of more than 120 degrees fold over: the
-ledger tells the largest one. Drafts show glass without its edits.
+surface mirrors there. Where rays of mirrors or glass meet an edited object, they are turned, too
+(surfaces/edits_at_hits.py), but not in drafts and where reflections are mean colours. A mirrored ray that an edit sends
+into its own closed object begins where it leaves that. Edits of more than 120 degrees fold over: the ledger tells the
+largest one. Drafts show glass without its edits.
 """
 
 from __future__ import annotations
@@ -38,13 +39,15 @@ from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from ..surfaces import geodesic, reflection_edits
 from ..surfaces.draw import SURFACE_TEXTURES, SurfaceStages
-from ..surfaces.reflection_edits import MOST_CONSTRAINTS, MOST_LAYERS, MOST_REGIONS, Constraint, EditTable, Region
+from ..surfaces.edits_at_hits import EditedObject, EditsAtHits
+from ..surfaces.reflection_edits import MOST_CONSTRAINTS, MOST_LAYERS, MOST_REGIONS, Constraint, Region
 
 REFLECTION, REFRACTION = "REFLECTION", "REFRACTION"
 KINDS = {
     "EUCLIDEAN": reflection_edits.EUCLIDEAN, "GEODESIC": reflection_edits.GEODESIC,
     "PAINTED": reflection_edits.PAINTED,
 }  # fmt: skip
+NOTHING_EDITED = "no object has an edit of its reflections"
 EDIT, EDIT_AT_POINT = "surface.edit", "surface.edit_at_point"
 CONSTRAINT = (
     Param("enabled", "Enabled", True, "Whether the constraint acts"),
@@ -117,8 +120,9 @@ PROGRAMS = (edit_program(0), edit_program(MOST_LAYERS))
 class _Edited:
     """An object with its edits on the GPU."""
 
-    def __init__(self, row: int, batch: geometry.Batch, table: EditTable, layers: int, largest: float):
-        self.row, self.batch, self.table, self.layers, self.largest = row, batch, table, layers, largest
+    def __init__(self, at_hits: EditedObject, batch: geometry.Batch, layers: int, largest: float):
+        self.at_hits, self.batch, self.layers, self.largest = at_hits, batch, layers, largest
+        self.row, self.table = at_hits.row, at_hits.table
 
 
 class ReflectionEditing(Technique):
@@ -141,14 +145,16 @@ class ReflectionEditing(Technique):
         Write("surface.lobe", "RGBA32F", "Where lobes point: turned by the edit that goes with it", by_need=True),
     )
 
+    provides = (EditsAtHits,)
+
     def __init__(self):
         self._edited: list[_Edited] = []
         self._kept: dict[object, _Edited] = {}
         self._surfaces: dict[object, geodesic.Surface] = {}
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        if not any(_edits(instance)[0] for instance in snapshot.instances if instance.own):
-            return "no object has an edit of its reflections"
+        if not has_edits(snapshot):
+            return NOTHING_EDITED
         return bends_lines(snapshot)
 
     def begin(self, frame: Frame) -> None:
@@ -168,6 +174,7 @@ class ReflectionEditing(Technique):
             kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, surfaces[where])
         self._kept, self._edited, self._surfaces = kept, list(kept.values()), surfaces
         frame.shared(SurfaceStages).apply.append(self._at_film_point)
+        frame.provide(EditsAtHits([one.at_hits for one in self._edited]))
 
     def sample(self, frame: Frame) -> None:
         self._edit(frame, {name: frame.images[f"surface.{name}"] for name in SURFACE_IMAGES}, EDIT)
@@ -202,6 +209,11 @@ class ReflectionEditing(Technique):
 
     def release(self) -> None:
         self._edited, self._kept, self._surfaces = [], {}, {}
+
+
+def has_edits(snapshot: Snapshot) -> bool:
+    """Whether an object has a constraint that is enabled."""
+    return any(_edits(instance)[0] for instance in snapshot.instances if instance.own)
 
 
 def _edits(instance: Instance) -> tuple[list[dict], list[dict]]:
@@ -280,7 +292,10 @@ def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geode
         position=mesh.positions, **{f"layers{k}": packed[:, 4 * k : 4 * k + 4] for k in range(count)}
     )
     batch = geometry.triangle_batch(vertices, corners)
-    return _Edited(row, batch, table, len(layers), max(one.angle for one in found))
+    outward = np.sign(_volume(surface)) if closed else 0.0
+    return _Edited(
+        EditedObject(row, instance, table, float(outward), packed), batch, len(layers), max(one.angle for one in found)
+    )
 
 
 def _moved(matrix: np.ndarray, point) -> np.ndarray:
@@ -324,6 +339,12 @@ def _is_closed(mesh: Mesh) -> bool:
     triangles = number.reshape(-1)[mesh.corner_vertices[mesh.triangle_corners]]
     triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
     return closed(places, triangles) or closed(places, triangles[:, ::-1])
+
+
+def _volume(surface: geodesic.Surface) -> float:
+    """Of a closed surface, m3; below zero where normals of its triangles point into it."""
+    a, b, c = (surface.positions[surface.triangles[:, k]] - surface.positions.mean(axis=0) for k in range(3))
+    return float((a * np.cross(b, c)).sum()) / 6.0
 
 
 def _painted(mesh: Mesh) -> np.ndarray:

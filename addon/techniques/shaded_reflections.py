@@ -49,7 +49,7 @@ from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
 from ..materials.compiler import least_roughness, may_refract
 from ..scene import acceleration
-from ..scene.materials import may_be_glossy
+from ..scene.materials import SURFACE_IMAGES, may_be_glossy
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
@@ -65,6 +65,7 @@ from ..surfaces.draw import (
     refracts,
     surface_bindings,
 )
+from ..surfaces.edits_at_hits import EditsAtHits
 from ..surfaces.hits import ANY_RAY, MET, Hits, Records, closure_bindings, take_closures
 from .environment_light import directions_rate
 from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
@@ -83,6 +84,7 @@ REACH = (
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
 BOTH_ROUGHNESS = 0.3  # of glass of which both ways are followed, as in lib/closure.glsl
+LOBE = SURFACE_IMAGES.index("lobe")
 ORDERS = ("direct", "indirect")
 MOST_PARTS = 6  # bounces that have turns of their own (frame/shares.py); later ones have those of the last
 
@@ -209,7 +211,7 @@ class ShadedReflections(Technique, BothWays):
         ),
     )
     provides = (ShadedLobes,)
-    requests = (GatherBindings, EmissivePoints, TracedLobes, MediaService, LightOfMedia)
+    requests = (GatherBindings, EmissivePoints, TracedLobes, MediaService, LightOfMedia, EditsAtHits)
 
     def __init__(self):
         self._sources = PathSources(
@@ -286,6 +288,8 @@ class ShadedReflections(Technique, BothWays):
         }  # fmt: skip
         onward_roughness = min(reach["shaded_roughness"], ONWARD_ROUGHNESS)
 
+        edits = frame.service(EditsAtHits)
+        turned = edits.begin(frame, frame.images["surface.edit"]) if edits is not None else images.Target(())
         rays, onward = self._take(frame), self._take(frame)
         records = Records.take(frame.size)
         closures = take_closures(frame.size, records.target.depth)
@@ -303,6 +307,9 @@ class ShadedReflections(Technique, BothWays):
                             path=rays.colors[2],
                         )  # fmt: skip
                         yield
+                        if edits is not None:
+                            edits.solve(frame, self, turned, records, closures, rays)
+                            closures.colors[LOBE].beside = {"surface_edit": turned.colors[0]}
                         self._into = drawing.images(number)
                         self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
                         self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
@@ -323,13 +330,14 @@ class ShadedReflections(Technique, BothWays):
                             "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
                         }  # fmt: skip
                         bound = closure_bindings(closures)
-                        # Edits of what the camera sees go with the ray until it leaves that object.
-                        bound["surface_lobe"].beside = frame.images["surface.lobe"].beside
+                        if edits is not None:  # what bends light has its edit with the ray until that leaves
+                            closures.colors[LOBE].beside["carried_edit"] = turned.colors[1]
                         self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
-                        bound["surface_lobe"].beside = {}
+                        closures.colors[LOBE].beside = {}
                         rays, onward = onward, rays
         finally:  # also where a viewport drops the sample
-            for image in (*rays.colors, *onward.colors, *closures.colors):
+            closures.colors[LOBE].beside = {}
+            for image in (*rays.colors, *onward.colors, *closures.colors, *turned.colors):
                 images.pool.give(image)
             records.give()
             maps.done()

@@ -9,6 +9,8 @@ from bpy_extras import view3d_utils
 from mathutils import Vector
 from mathutils.interpolate import poly_3d_calc
 
+from ..frame.technique import identifier
+from ..techniques.edit_heat import EditHeat
 from ..techniques.reflection_editing import ReflectionEditing
 from . import ENGINE
 from .scoped_panels import active_entry
@@ -245,6 +247,7 @@ def _draw(self, context):
     row = self.layout.row(align=True)
     row.operator("candela.pick_reflection", icon="EYEDROPPER")
     row.operator("candela.return_to_view", icon="LOOP_BACK")
+    self.layout.prop(context.scene.candela, identifier(EditHeat.name, "shown"), toggle=True, icon="COLOR")
     entry = active_entry(edited.candela, CONSTRAINTS)
     turned = angle_of(entry, edited) if entry is not None and edited.type == "MESH" else None
     if turned is not None:

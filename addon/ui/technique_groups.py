@@ -30,7 +30,7 @@ GROUPS = (
     Group("bounced_light", "Bounced Light", (("indirect", "Bounces"),)),
     Group(
         "reflections", "Reflections and Glass", (("reflection", "Reflections"), ("transmission", "Glass")),
-        ("shaded_reflections",),
+        ("shaded_reflections", "edit_heat"),
     ),
     Group("caustics", "Caustics", (("caustics", "Caustics"),)),
     Group("fog", "Fog and Smoke", (("volume", "Fog"),), ("volume_caustics", "media")),

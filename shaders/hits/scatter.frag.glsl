@@ -18,10 +18,8 @@ void main()
   if (surface_position_fetch(pixel).w == 0.0 || max_component(tint.rgb) <= 0.0) {
     return;
   }
-#ifdef ONWARD
-  Surface s = SURFACE_DECODED(pixel);  // edits are of what the camera sees
-#else
   Surface s = SURFACE_READ(pixel);
+#ifndef ONWARD
   if (mirrored_way != 0) {  // of glass that goes both ways; the other way all lobes go
     if (!surface_goes_both_ways(s)) {
       return;
@@ -37,7 +35,7 @@ void main()
   int code = int(before.w + 0.5);
   bool clear = path_is_clear(code);
   int mirrored = path_mirrors(code);
-  bool edited = path_is_edited(code);
+  bool edited = path_is_edited(code) || (edits_what_leaves(s) && s.glossy_ior > 1.0);
   code = (code & 3) + PATH_MIRROR * mirrored;
   if (code == 0) {
     return;
@@ -56,6 +54,7 @@ void main()
   vec3 weight = vec3(0.0);
   vec3 direction = vec3(0.0);
   float density = 0.0;
+  bool enters = false;  // whether an edit sends what leaves a solid into it again
   if (s.kind == LOBE_REFRACTION && ray_number <= interfaces) {
     Interface surface = interface_begin(s.glossy_normal, viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
                                         s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
@@ -71,14 +70,13 @@ void main()
     }
 #endif
     weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
-#ifdef HAS_SURFACE_EDIT
-#ifdef ONWARD
+#ifdef HAS_CARRIED_EDIT
     if (edited && s.glossy_ior <= 1.0 && dot(direction, surface.normal) < 0.0) {  // what leaves an edited object goes where the edit turns it
-      vec4 edit = surface_edit_fetch(pixel);
+      vec4 edit = carried_edit_fetch(pixel);
       direction = quaternion_turned(edit / max(length(edit), 1e-30), direction);
       edited = false;
+      enters = dot(direction, s.geometric_normal) > 0.0;
     }
-#endif
 #endif
     code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0) + (edited ? PATH_EDITED : 0);
   }
@@ -87,7 +85,7 @@ void main()
     direction = lobe_sample(lobe, u, weight);
     lobe_reflection(lobe, direction, density);
     weight *= may_mirror(s, direction) ? 1.0 : 0.0;
-    code += PATH_MIRROR;
+    code += PATH_MIRROR + (edited ? PATH_EDITED : 0);
 #ifndef ONWARD
     density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
 #endif
@@ -97,10 +95,10 @@ void main()
   if (!(most > 1e-4) || !is_finite(most)) {
     return;
   }
-  vec3 side = ((code & PATH_BENT) != 0) ? -s.geometric_normal : side_of_ray(s, direction);
+  vec3 side = ((code & PATH_BENT) != 0 && !enters) ? -s.geometric_normal : side_of_ray(s, direction);
   side = (dot(side, direction) < 0.0 && surface_is_edited(s)) ? -side : side;
   out_origin = vec4(ray_origin(s.position, side), width);
-  if ((code & PATH_BENT) == 0 && enters_itself(s, direction)) {
+  if (enters || ((code & PATH_BENT) == 0 && enters_itself(s, direction))) {
     out_origin.w = -width;
   }
   out_direction = vec4(direction, density);

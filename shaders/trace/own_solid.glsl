@@ -9,7 +9,7 @@ vec3 beyond_solid(vec3 origin, vec3 direction, uint salt)
 {
   ivec2 hit;
   for (int wall = 0; wall < MOST_OWN_WALLS; wall++) {
-    float t = trace_nearest(origin, direction, 1e29, salt, hit);
+    float t = trace_layers(origin, direction, 1e29, 0.0, salt, true, false, hit);  // walls of glass, too
     if (t >= 1e29) {
       return origin;
     }

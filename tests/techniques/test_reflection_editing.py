@@ -661,3 +661,40 @@ def test_a_constraint_follows_a_shape_key(stage):
         own = bound(own_settings(ball), ball.evaluated_get(depsgraph), depsgraph)
         places.append(dict(dict(own)["reflection_editing_constraints"][0])["point"])
     assert places[0] == pytest.approx((0, -1, 0)) and places[1] == pytest.approx((0, 1, 0), abs=0.02)
+
+
+def test_a_mirror_shows_an_edited_mirror_edited(stage):
+    """As the mirror whose normals lean by half the angle, both seen in another one; by distances along the surface, too."""
+    mirror = mirror_scene(stage)
+    silver = stage.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1))
+    stage.rectangle((-9, -9), (9, 9), material=silver, location=(0, -8, 0), turn=(-np.pi / 2, 0, 0))
+    stage.camera((0, -6, 3), (np.radians(73), 0, np.pi), 0.25)
+    after = about((0, 1, 0), 16) @ UP
+    plain = stage.render(2, (32, 32), bounces=3)["combined"]
+    constrain(mirror, (0, 0, 0), tuple(1000 * after), (0, 0, 5))
+    found = stage.render(2, (32, 32), bounces=3)["combined"]
+    mirror.candela.reflection_editing_regions[0].kind = "GEODESIC"
+    mirror.update_tag()
+    along = stage.render(2, (32, 32), bounces=3)["combined"]
+    mirror.candela.reflection_editing_constraints.clear()
+    mirror.data.normals_split_custom_set([tuple(about((0, 1, 0), 8) @ UP)] * 4)
+    expected = stage.render(2, (32, 32), bounces=3)["combined"]
+    assert np.abs(plain - expected).mean() > 0.02
+    assert np.abs(found - expected).mean() < 0.1 * np.abs(plain - expected).mean()
+    assert np.abs(along - found).max() < 1e-3
+
+
+def test_the_heat_map_shows_how_far_an_edit_turns(stage):
+    """Yellow where the mirror is turned by 60 degrees, grey elsewhere; the picture itself stays."""
+    mirror = mirror_scene(stage)
+    after = about((1, 0, 0), 60) @ mirrored(unit(0, -6, 3), UP)
+    constrain(mirror, (0, 0, 0), tuple(10 * after), (0, -6, 3))
+    plain = stage.render(1, (24, 24), bounces=1)["combined"]
+    stage.scene.candela.edit_heat_shown = True
+    assert np.array_equal(plain, stage.render(1, (24, 24), bounces=1)["combined"])
+    frame = engine.session(stage.scene, "final").renderer.frame
+    assert frame.picture == "film.turned"
+    map_ = images.read(frame.images["film.turned"])
+    middle, corner = map_[11, 12], map_[23, 0]
+    assert middle[0] > 1.1 * middle[1] > 20 * middle[2]
+    assert corner[0] == corner[1] == corner[2]

@@ -1,0 +1,170 @@
+"""What Auto takes of the shadow and the indirect slot, beside all that it could: `python -m bench auto`.
+
+Twenty scenes that are no samples (bench/auto_scenes.py), 64x48 pixels. Each technique of a slot renders two seeds,
+and five where that is fast; its error is the mean relMSE beside Cycles (net of that reference's noise), its time the
+least processor seconds of those after the first, which compiles. Shadows are rendered
+without bounces, the indirect slot with all.
+
+Error x time does not depend on the samples of a method without bias; Auto holds where its product is at most 1.1 times
+the least of the slot, or where the same technique is what it took. What is measured is kept at once in
+bench/results/auto.json, by scene, slot and samples, so that an interrupted run goes on; `--page` writes docs/auto.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from pathlib import Path
+
+from bench.auto_scenes import SCENES
+from bench.markdown import put_between, table, write_whole
+from bench.run import ROOT
+
+RESULTS = ROOT / "bench" / "results" / "auto.json"
+PAGE = ROOT / "docs" / "auto.md"
+SIZE = 64, 48
+SLOTS = {"shadow": 0, "indirect": 16}  # bounces
+REFERENCE = 1024
+SEEDS = 5
+FAST = 0.3  # seconds
+NEAR = 1.1  # of the best product, up to which Auto holds
+AUTO = "AUTO"
+
+
+def techniques(slot: str) -> list[str]:
+    from addon.techniques import REGISTRY
+
+    return [technique.name for technique in REGISTRY if slot in technique.fills]
+
+
+def rendered(scene, engine: str, samples: int, seed: int, bounces: int):
+    """(H, W, 3) Combined, and processor seconds."""
+    from addon.compare.reference import render_passes
+
+    before = time.process_time()
+    found = render_passes(scene, engine, samples, seed, size=SIZE, bounces=bounces).images["combined"][..., :3]
+    return found, time.process_time() - before
+
+
+def measured(scene, slot: str, wish: str, samples: int, truth) -> dict:
+    """Error and seconds of a technique (or Auto), and what filled the slot."""
+    from addon.compare.metrics import compare_radiance
+    from addon.frame import ledger
+
+    setattr(scene.candela, f"slot_{slot}", wish)
+    errors, seconds = [], []
+    for seed in range(1, SEEDS + 1):
+        picture, took = rendered(scene, "CANDELA", samples, seed, SLOTS[slot])
+        found = compare_radiance("combined", picture, *truth)
+        errors.append(max(found.relmse - found.floor, 1e-6))
+        seconds.append(took)
+        if seed > 1 and took > FAST:
+            break
+    setattr(scene.candela, f"slot_{slot}", AUTO)
+    filled = [row for row in ledger.latest().rows if slot in row.slot.split(", ") and row.state != "skipped"]
+    return {
+        "error": sum(errors) / len(errors), "seconds": min(seconds[1:]),
+        "filled": filled[0].name if filled else "nothing",
+    }  # fmt: skip
+
+
+def product(row: dict) -> float:
+    return row["error"] * row["seconds"]
+
+
+def verdict(rows: dict[str, dict]) -> tuple[str, float]:
+    """The best technique by error x time, and how many times as much Auto's choice has, measured as that technique."""
+    able = {name: row for name, row in rows.items() if name != AUTO and row["filled"] == name}
+    best = min(able, key=lambda name: product(able[name]))
+    took = rows[AUTO]["filled"]
+    own = product(able[took]) if took in able else product(rows[AUTO])
+    return best, own / product(able[best])
+
+
+def page(results: dict) -> str:
+    """Tables by slot and number of samples."""
+    parts = []
+    for slot in SLOTS:
+        for samples in sorted({int(key.split("/")[2]) for key in results if key.split("/")[1] == slot}):
+            names = techniques(slot)
+            head = ["scene", *(name.replace("_", " ") for name in names), "best", "Auto took", "its error x time"]
+            rows, ratios = [head], []
+            for scene in SCENES:
+                found = results.get(f"{scene}/{slot}/{samples}")
+                if found is None:
+                    continue
+                best, ratio = verdict(found)
+                ratios.append(ratio)
+                cells = [
+                    f"{found[name]['error']:.4f}, {found[name]['seconds']:.2f} s"
+                    if name in found and found[name]["filled"] == name else "–"
+                    for name in names
+                ]  # fmt: skip
+                took = found[AUTO]["filled"].replace("_", " ")
+                rows.append([scene.replace("_", " "), *cells, best.replace("_", " "), took, f"{ratio:.2f}"])
+            held = sum(ratio <= NEAR for ratio in ratios)
+            mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
+            parts.append(
+                f"### {slot.capitalize()} slot, {samples} sample{'s' if samples > 1 else ''}\n\n{table(rows)}\n\n"
+                f"Auto is within {100 * (NEAR - 1):.0f} % of the best in {held} of {len(ratios)} scenes; its error "
+                f"x time is {mean:.2f} times the best one's in the (geometric) mean, {max(ratios):.2f} times at worst."
+            )
+    return "\n\n".join(parts)
+
+
+# ------------------------------------------------------------------------------------------------------------- command
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenes", nargs="*", default=[], metavar="NAME")
+    parser.add_argument("--slots", nargs="*", default=[*SLOTS], choices=[*SLOTS])
+    parser.add_argument("--samples", nargs="*", type=int, default=[1, 4])
+    parser.add_argument("--anew", action="store_true", help="measure again what is known")
+    parser.add_argument(
+        "--only-auto", action="store_true", help="ask anew what Auto takes; techniques stay as measured"
+    )
+    parser.add_argument("--page", action="store_true", help="write docs/auto.md from what was measured")
+    parser.add_argument("--results", type=Path, default=RESULTS)
+
+
+def command(options: argparse.Namespace) -> int:
+    results = json.loads(options.results.read_text()) if options.results.exists() else {}
+    if not options.page or options.scenes:
+        import bpy  # noqa: F401
+
+        import addon
+
+        addon.register()
+        for name in options.scenes or SCENES:
+            _measure(name, options, results)
+    if options.page:
+        put_between(PAGE, "python -m bench auto --page", page(results))
+    else:
+        print(page(results))
+    return 0
+
+
+def _measure(name: str, options: argparse.Namespace, results: dict) -> None:
+    from addon import engine
+    from bench.auto_scenes import build
+
+    wanted = [(slot, n) for slot in options.slots for n in options.samples if f"{name}/{slot}/{n}" not in results
+              or options.anew or options.only_auto]  # fmt: skip
+    if not wanted:
+        return
+    scene = build(name)
+    truths: dict[str, tuple] = {}
+    for slot, samples in wanted:
+        if slot not in truths:
+            first, second = (rendered(scene, "CYCLES", REFERENCE // 2, seed, SLOTS[slot])[0] for seed in (1, 2))
+            truths[slot] = (first + second) / 2, (first - second) / 2
+        found = dict(results.get(f"{name}/{slot}/{samples}", {})) if options.only_auto else {}
+        for wish in (AUTO, *(() if options.only_auto else techniques(slot))):
+            found[wish] = measured(scene, slot, wish, samples, truths[slot])
+        results[f"{name}/{slot}/{samples}"] = found
+        best, ratio = verdict(found)
+        print(f"{name} {slot} {samples}: Auto took {found[AUTO]['filled']}, best {best}, {ratio:.2f}", flush=True)
+        write_whole(options.results, json.dumps(results, indent=1) + "\n")
+    engine.free_sessions()
