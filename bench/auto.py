@@ -1,9 +1,9 @@
 """What Auto takes of the shadow and the indirect slot, beside all that it could: `python -m bench auto`.
 
-Twenty scenes that are no samples (bench/auto_scenes.py), 64x48 pixels. Each technique of a slot renders two seeds,
-and five where that is fast; its error is the mean relMSE beside Cycles (net of that reference's noise), its time the
-least processor seconds of those after the first, which compiles. Shadows are rendered
-without bounces, the indirect slot with all.
+Twenty scenes that are no samples (bench/auto_scenes.py), 64x48 pixels. Each technique of a slot renders two seeds, and
+five where that is fast; its error is the mean relMSE beside Cycles (net of that reference's noise, and at least as much
+as that), its time the least processor seconds of those after the first, which compiles. Shadows are rendered without
+bounces, the indirect slot with all.
 
 Error x time does not depend on the samples of a method without bias; Auto holds where its product is at most 1.1 times
 the least of the slot, or where the same technique is what it took. What is measured is kept at once in
@@ -29,6 +29,7 @@ SLOTS = {"shadow": 0, "indirect": 16}  # bounces
 REFERENCE = 1024
 SEEDS = 5
 FAST = 0.3  # seconds
+SLOW = 8.0  # times what Auto takes: slower techniques are rendered once, and not with more samples
 NEAR = 1.1  # of the best product, up to which Auto holds
 AUTO = "AUTO"
 
@@ -48,8 +49,9 @@ def rendered(scene, engine: str, samples: int, seed: int, bounces: int):
     return found, time.process_time() - before
 
 
-def measured(scene, slot: str, wish: str, samples: int, truth) -> dict:
-    """Error and seconds of a technique (or Auto), and what filled the slot."""
+def measured(scene, slot: str, wish: str, samples: int, truth, most: float = math.inf) -> dict:
+    """Error and seconds of a technique (or Auto), and what filled the slot. `most`: seconds, above which one picture
+    has to do."""
     from addon.compare.metrics import compare_radiance
     from addon.frame import ledger
 
@@ -58,14 +60,14 @@ def measured(scene, slot: str, wish: str, samples: int, truth) -> dict:
     for seed in range(1, SEEDS + 1):
         picture, took = rendered(scene, "CANDELA", samples, seed, SLOTS[slot])
         found = compare_radiance("combined", picture, *truth)
-        errors.append(max(found.relmse - found.floor, 1e-6))
+        errors.append(max(found.relmse - found.floor, found.floor, 1e-6))
         seconds.append(took)
-        if seed > 1 and took > FAST:
+        if (seed > 1 and took > FAST) or took > most:
             break
     setattr(scene.candela, f"slot_{slot}", AUTO)
     filled = [row for row in ledger.latest().rows if slot in row.slot.split(", ") and row.state != "skipped"]
     return {
-        "error": sum(errors) / len(errors), "seconds": min(seconds[1:]),
+        "error": sum(errors) / len(errors), "seconds": min(seconds[1:] or seconds),
         "filled": filled[0].name if filled else "nothing",
     }  # fmt: skip
 
@@ -146,6 +148,11 @@ def command(options: argparse.Namespace) -> int:
     return 0
 
 
+def _slow(rows: dict[str, dict]) -> set[str]:
+    """Techniques that took far longer than Auto."""
+    return {name for name, row in rows.items() if name != AUTO and row["seconds"] > SLOW * rows[AUTO]["seconds"]}
+
+
 def _measure(name: str, options: argparse.Namespace, results: dict) -> None:
     from addon import engine
     from bench.auto_scenes import build
@@ -161,8 +168,11 @@ def _measure(name: str, options: argparse.Namespace, results: dict) -> None:
             first, second = (rendered(scene, "CYCLES", REFERENCE // 2, seed, SLOTS[slot])[0] for seed in (1, 2))
             truths[slot] = (first + second) / 2, (first - second) / 2
         found = dict(results.get(f"{name}/{slot}/{samples}", {})) if options.only_auto else {}
+        slow = _slow(results.get(f"{name}/{slot}/1", {})) if samples > 1 else set()
         for wish in (AUTO, *(() if options.only_auto else techniques(slot))):
-            found[wish] = measured(scene, slot, wish, samples, truths[slot])
+            if wish not in slow:
+                most = SLOW * found[AUTO]["seconds"] + 2.0 if AUTO in found else math.inf
+                found[wish] = measured(scene, slot, wish, samples, truths[slot], most)
         results[f"{name}/{slot}/{samples}"] = found
         best, ratio = verdict(found)
         print(f"{name} {slot} {samples}: Auto took {found[AUTO]['filled']}, best {best}, {ratio:.2f}", flush=True)
