@@ -664,7 +664,7 @@ def test_a_constraint_follows_a_shape_key(stage):
 
 
 def test_a_mirror_shows_an_edited_mirror_edited(stage):
-    """As the mirror whose normals lean by half the angle, both seen in another one; by distances along the surface, too."""
+    """As the mirror whose normals lean by half the angle, both seen in another; by distances along the surface, too."""
     mirror = mirror_scene(stage)
     silver = stage.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1))
     stage.rectangle((-9, -9), (9, 9), material=silver, location=(0, -8, 0), turn=(-np.pi / 2, 0, 0))
