@@ -4,10 +4,11 @@ A material is a caster if it bends light (glass, of any roughness) or mirrors it
 (Glossy, Metallic, or Principled with metallic from METALLIC on) and is smooth: roughness up to SMOOTH, known from the
 socket's own value. What a varnish over a diffuse surface mirrors stays with indirect light.
 
-A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. Shadow rays of the lights
-answered for take glass as opaque: what passes it arrives as photons. All glass counts there, so a pane beside a lens is
-a caster, too. A scene in which all glass is flat panes and nothing else throws caustics is left to straight light,
-as is right for panes.
+A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. So are emissive meshes,
+and, where there is glass, the bright part of the world (sources/bright_world.py): the rest of it is wide light, which
+clear glass leaves as it is. Shadow rays of what is answered for take glass as opaque: what passes it arrives as photons.
+All glass counts there, so a pane beside a lens is a caster, too. A scene in which all glass is flat panes and nothing
+else throws caustics is left to straight light, as is right for panes.
 
 Blender's switches: with Reflective or Refractive caustics off (Cycles' Light Paths), reflected or refracted light is
 left out, but for glass with Shadow Caustics: objects set to cast them, under lights set to give them. Where the Cycles
@@ -28,9 +29,11 @@ from ..materials.compiler import may_emit, may_refract
 from ..materials.graph import Graph, Node
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from ..sources import lights
+from ..sources.bright_world import BrightPart, bright_part
 from .light_views import groups
 
 SLOT = "caustics"
+MESHES, WORLD = "emissive meshes", "the world"  # keys beside those of lamps, which are none of these
 SMOOTH = 0.25  # roughness
 METALLIC = 0.5
 MARGIN = 0.02  # of a caster's box, for what its float32 bounds miss
@@ -106,13 +109,26 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
         return "all glass is flat panes, which light passes straight"
     given = [light for light in snapshot.lights if light.cast_shadow and np.any(light.strength)]
     given = [light for light in given if light.visibility.diffuse and (light.caustics or not by_flags or mirrors)]
-    if not given:
-        return "no lamp that casts shadows lights them: light of the world and of meshes passes straight"
+    others = () if by_flags else _other_sources(snapshot, glass, mirrors)
+    if not given and not others:
+        return "no lamp that casts shadows, no emissive mesh and no bright part of the world lights them"
     boxes = np.array([_box(one, snapshot.meshes[one.mesh]) for one in shown])
     low, high = groups(*grown(boxes[:, 0], boxes[:, 1]))
-    keys = frozenset(light.key for light in given)
+    keys = frozenset(light.key for light in given).union(others)
     bent = frozenset(light.key for light in given if light.caustics) if by_flags else keys
     return Casters(frozenset(glass), mirrors, low, high, keys, bent)
+
+
+def _other_sources(snapshot: Snapshot, glass: set[int], mirrors: dict[int, float]) -> tuple[str, ...]:
+    """Keys of what may light casters and is no lamp. The world's light is left to straight ways where nothing is glass:
+    what metal mirrors of it is wide mostly, and virtual lights bring it."""
+    world, found = snapshot.world, []
+    shining = {k for k in snapshot.used_materials if may_emit(snapshot.materials[k].graph)} - glass - set(mirrors)
+    if any(one.visibility.diffuse and not shining.isdisjoint(one.materials) for one in snapshot.instances):
+        found.append(MESHES)
+    if glass and np.any(world.color) and not world.even and world.visibility.diffuse and snapshot.casts_shadows:
+        found.append(WORLD)
+    return tuple(found)
 
 
 class Answered:
@@ -121,6 +137,7 @@ class Answered:
     def __init__(self):
         self.casters: Casters | None = None
         self.known = False
+        self.bright: BrightPart | None = None  # of the world
 
 
 def of(frame: Frame) -> Casters | None:
@@ -129,13 +146,33 @@ def of(frame: Frame) -> Casters | None:
     if not shared.known:
         found = casters_of(frame.snapshot) if frame.owned(LIGHT_SPECULAR_DIFFUSE) else None
         shared.casters, shared.known = found if isinstance(found, Casters) else None, True
+        if shared.casters is not None and WORLD in shared.casters.lights and frame.plan.runs("environment_light"):
+            shared.bright = bright_part(frame.environment)
     return shared.casters
+
+
+def bright_world(frame: Frame) -> BrightPart | None:
+    """The part of the world whose light arrives by the slot where it passes casters."""
+    return frame.shared(Answered).bright if of(frame) is not None else None
 
 
 def answered(frame: Frame, emitter: lights.Emitter) -> bool:
     """Whether light of this lamp that passes casters arrives by the slot: to its shadows glass is opaque."""
     found = of(frame)
-    return found is not None and emitter.light is not None and emitter.light.key in found.lights
+    return found is not None and key_of(emitter) in found.lights
+
+
+def key_of(emitter: lights.Emitter) -> str:
+    """Of a lamp, or of what emissive meshes or the world are to photons."""
+    if emitter.light is not None:
+        return emitter.light.key
+    return MESHES if emitter.kind == lights.SURFACE else getattr(emitter, "key", "")
+
+
+def meshes_answered(frame: Frame) -> bool:
+    """The same for light of emissive meshes."""
+    found = of(frame)
+    return found is not None and MESHES in found.lights
 
 
 def glass_alone(frame: Frame) -> frozenset[int]:
@@ -147,7 +184,8 @@ def glass_alone(frame: Frame) -> frozenset[int]:
 def stopped_by_all(frame: Frame) -> frozenset[int]:
     """The same where all light is answered for; nothing where some lamp, mesh or the world shines through glass."""
     materials = frame.snapshot.materials
-    if frame.environment.power > 0 or any(may_emit(materials[k].graph) for k in frame.snapshot.used_materials):
+    emits = any(may_emit(materials[k].graph) for k in frame.snapshot.used_materials)
+    if frame.environment.power > 0 or (emits and not meshes_answered(frame)):
         return frozenset()
     lamps = [one for one in frame.emitters if one.light.cast_shadow]
     return glass_alone(frame) if all(answered(frame, one) for one in lamps) else frozenset()

@@ -148,7 +148,7 @@ class CausticMaps:
         there are maps of all views or of none."""
         if frame.service(ShadedLobes) is None:
             return False
-        return self._count < MOST or light.emitter.light.key in self.lights
+        return self._count < MOST or caustic_casters.key_of(light.emitter) in self.lights
 
     def add(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, photons: Photons
@@ -194,7 +194,7 @@ class CausticMaps:
         kept.views.append(values)
         kept.block = None
         self._count += 1
-        self.lights.add(light.emitter.light.key)
+        self.lights.add(caustic_casters.key_of(light.emitter))
 
     def ready(self, frame: Frame) -> list[KeptMaps]:
         """`of`, with the blocks that programs bind."""

@@ -85,6 +85,11 @@ class EmissiveTriangles:
         weight = np.abs(self.radiance) @ lights.LUMINANCE * double_area / 2
         weight = np.where(np.isfinite(weight), weight, 0.0)
         self.power = float(weight.sum())
+        # As one light: where its power is, and half the diagonal of a square that is as large. Several lamps of one
+        # size stand for as much area.
+        self.centre = np.average(self.corners.mean(axis=1), axis=0, weights=weight) if self.power > 0 else np.zeros(3)
+        density = (weight * weight / np.maximum(double_area / 2, 1e-30)).sum()
+        self.reach = float(np.sqrt(self.power**2 / max(float(density), 1e-300) / 2)) if self.power > 0 else 0.0
         self._edges = np.concatenate([[0.0], np.cumsum(weight)])
 
     def row(
@@ -101,6 +106,12 @@ class EmissiveTriangles:
         if at_hits:
             row[lights.LIGHT.at.first_view] = lights.passing_bits(self.passing[k])
         return row
+
+    def stretched(self, x: float, y: float) -> np.ndarray:
+        """Three numbers for `draw` out of two: where `x` lies within a triangle's share of the power is the third."""
+        k = int(np.clip(np.searchsorted(self._edges, x * self.power, side="right") - 1, 0, len(self.radiance) - 1))
+        share = max(self._edges[k + 1] - self._edges[k], 1e-300)
+        return np.array([x, y, np.clip((x * self.power - self._edges[k]) / share, 0.0, 1.0)])
 
     def draw(self, x: float, y: float, z: float) -> tuple[int, np.ndarray, float]:
         """From three uniform numbers: a triangle, a point on it, and the density per m2."""

@@ -18,6 +18,7 @@ from ..frame.technique import Service
 from ..gfx.context import to_hold
 from ..materials.compiler import may_emit
 from ..sources import lights
+from .caustic_casters import MESHES, WORLD, bright_world
 from .emissive_triangles import PATHS, EmissiveTriangles
 
 SHOWN_THROUGH = "transmission.shown"  # image: the same of what is seen through glass
@@ -97,14 +98,17 @@ class PathSources:
             for k in range(self.emissive_points):
                 index = frame.sample * self.emissive_points + k
                 drawn = frame.random_volume_at(index, f"{self.use}/emissive")
-                rows.append(self._triangles.row(drawn, self.emissive_points, lights.SHADOW_FLAG))
+                blocked = lights.GLASS_BLOCKS_FLAG * (MESHES in by_photons)
+                rows.append(self._triangles.row(drawn, self.emissive_points, lights.SHADOW_FLAG + blocked))
         if self.world_flags:
             seen = lights.SHADOW_FLAG + self.world_flags
+            bright = bright_world(frame) if WORLD in by_photons else None
             numbers = range(frame.sample * self.directions, (frame.sample + 1) * self.directions)
             chosen = np.array([frame.random_at(index, f"{self.use}/world") for index in numbers]).reshape(-1, 2)
             for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
                 light = radiance / density
-                rows.append(lights.direction_row(direction, light, density, seen, 0, 1, self.directions))
+                blocked = lights.GLASS_BLOCKS_FLAG * (bright is not None and bright.holds(radiance))
+                rows.append(lights.direction_row(direction, light, density, seen + blocked, 0, 1, self.directions))
         return rows
 
     def block(self, rows: list[np.ndarray]):

@@ -48,6 +48,7 @@ from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
+from .caustic_sources import sources_of
 from .interfaces import most_interfaces, upload_interfaces
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
 from .media import dimmed, is_endless
@@ -104,6 +105,7 @@ FEW_LOBES = 64  # and below which each has all lobes of a material: one of three
 VIEWS = 4  # of lights and casters in a sample, in the mean, where lights may take turns
 CHOICES = 0.569840291  # from one interface's number to the next, as in caustics/photon.frag.glsl
 WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
+VERY_WIDE, MANY = 0.3, 128  # and from which on its image is wide, too: below so many samples it has several points
 MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
 LEAST_SIDE = 48
 LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
@@ -113,7 +115,7 @@ LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: bey
 class LitView:
     """A light's view of casters in one sample."""
 
-    emitter: lights.Emitter
+    emitter: lights.Emitter  # or what stands for one (caustic_sources.py)
     sample: np.ndarray  # the point of the light that it looks from
     view: LightView
     lobes: tuple[int, ...]  # that photons may take there
@@ -141,8 +143,16 @@ def _points(emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]],
         place = emitter.position(emitter.middle())
         far = [np.linalg.norm((low + high) / 2 - place) for low, high in boxes]
         width = emitter.reach / max(min(far, default=np.inf), 1e-30)
-    most = int(np.clip(FEW // max(count, 1), 1, MOST_POINTS)) if width > WIDE else 1
+    few, most_points = (MANY, 2 * MOST_POINTS) if width > VERY_WIDE else (FEW, MOST_POINTS)
+    most = int(np.clip(few // max(count, 1), 1, most_points)) if width > WIDE else 1
     return 1 << most.bit_length() - 1  # so that all of them are evenly spread
+
+
+def _half_width(emitter: lights.Emitter) -> float:
+    """Radius of a disc as large as the light is, m; of suns the tangent of half their angle."""
+    if emitter.kind == lights.SUN:
+        return float(np.tan(min(emitter.radius, 1.5)))
+    return float(np.sqrt(emitter.area / np.pi)) if emitter.has_span else emitter.radius
 
 
 def lattice(k: int, count: int) -> float:
@@ -176,6 +186,7 @@ class Photons:
         self._interfaces: images.Image | None = None
         self._emission: Block | None = None
         self._parts = 1
+        self._others: list = []  # emissive meshes and the bright world, where they are answered for
         self._found: images.Target | None = None
         self._footprints: images.Target | None = None
 
@@ -187,6 +198,7 @@ class Photons:
         inner = [frame.materials.compiled[k].medium for k in casters.refracting]
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
         self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
+        self._others = sources_of(frame, casters)
 
     def views(
         self, frame: Frame, casters: caustic_casters.Casters, side: int, turn: tuple[int, int] | None = None
@@ -197,7 +209,7 @@ class Photons:
         alone = frame.settings.whole and frame.settings.samples == 1
         whole = frame.settings.whole
         for emitter, index, count, weight in self._turns(frame, casters, turn):
-            bends = casters.refracting and emitter.light.key in casters.bent
+            bends = casters.refracting and caustic_casters.key_of(emitter) in casters.bent
             lobes = ((REFRACTED,) if bends else ()) + reflected
             boxes = list(caustic_casters.boxes_of(frame, casters))
             sharing, of_turns = count, 0
@@ -224,8 +236,8 @@ class Photons:
         settings = frame.settings
         endless = is_endless(frame)
         answered = [
-            one for one in frame.emitters
-            if one.light.key in casters.lights and not (endless and one.kind == lights.SUN)
+            one for one in (*frame.emitters, *self._others)
+            if caustic_casters.key_of(one) in casters.lights and not (endless and one.kind == lights.SUN)
         ]  # fmt: skip
         if not settings.whole or settings.may_end_early:
             return answered, 1
@@ -250,7 +262,8 @@ class Photons:
     def resting(self, frame: Frame, casters: caustic_casters.Casters) -> set[str]:
         """Keys of the lights whose turn it is not in this sample."""
         answered, rounds = self._rounds(frame, casters)
-        return {one.light.key for k, one in enumerate(answered) if frame.sample % rounds != k % rounds}
+        resting = (one for k, one in enumerate(answered) if frame.sample % rounds != k % rounds)
+        return {caustic_casters.key_of(one) for one in resting}
 
     def traced(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int
@@ -293,7 +306,7 @@ class Photons:
         """Draws the casters' nearest surfaces by each lobe, and yields what programs that find photons bind."""
         emitter, view, count = light.emitter, light.view, light.count
         share = float(count) ** -0.5
-        wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
+        wide = _half_width(emitter)
         u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
         passing, mirroring = np.ones(4), 1.0
         if light.strata > 1:  # evenly, moved by the same for all: each part has one number at each interface

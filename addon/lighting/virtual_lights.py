@@ -51,7 +51,7 @@ from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
 from . import probes
-from .caustic_casters import answered
+from .caustic_casters import answered, bright_world, meshes_answered
 from .emissive_triangles import EmissiveTriangles
 from .leaving_light import lit_at_hits
 from .light_choice import GROUP, Choice, seen_middle
@@ -282,13 +282,17 @@ class VirtualLights:
         total = share * frame.settings.samples
         numbers = range(frame.sample * share, (frame.sample + 1) * share)
         if self._emissive is not None:
+            flags = lights.SHADOW_FLAG + lights.GLASS_BLOCKS_FLAG * meshes_answered(frame)
             for index in numbers:
                 drawn = frame.random_volume_at(index, "virtual lights/emissive")
-                rows.append(self._emissive.row(drawn, share, lights.SHADOW_FLAG, samples=total / share, at_hits=True))
+                rows.append(self._emissive.row(drawn, share, flags, samples=total / share, at_hits=True))
         if self._world:
             chosen = np.array([frame.random_at(index, "virtual lights/world") for index in numbers])
+            bright = bright_world(frame)
             for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
-                rows.append(lights.direction_row(direction, radiance / (density * share), density, seen, 0, 1))
+                blocked = lights.GLASS_BLOCKS_FLAG * (bright is not None and bright.holds(radiance))
+                light = radiance / (density * share)
+                rows.append(lights.direction_row(direction, light, density, seen + blocked, 0, 1))
         return rows
 
     def _light_rows(self, frame: Frame, share: int) -> list[np.ndarray]:

@@ -29,6 +29,7 @@ from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..lighting import depth_maps
+from ..lighting.caustic_casters import meshes_answered
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import DIRECT_WRITES, light_surfaces
@@ -90,7 +91,8 @@ class EmissiveLight(Technique):
         if not self._triangles.power > 0:
             return
         resolution = self._resolution(frame)
-        flags = lights.SHADOW_FLAG + lights.TRACED_FLAG
+        blocked = meshes_answered(frame)
+        flags = lights.SHADOW_FLAG + lights.TRACED_FLAG + lights.GLASS_BLOCKS_FLAG * blocked
         provider = frame.service(VisibilityProvider)
         patches = provider is not None and provider.serves_every_source(frame)
         points = []
@@ -111,6 +113,7 @@ class EmissiveLight(Technique):
                     frame, lambda place=point: _views(frame, place, 0, resolution), resolution, self, "emissive meshes"
                 )
             views = [] if self._traced else _views(frame, point, number, resolution)
+            views = [replace(view, glass_blocks=True) for view in views] if blocked else views
             row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)
             points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
         yield from light_surfaces(frame, self, points, 1 << lights.SURFACE, self._sources)

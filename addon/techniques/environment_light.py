@@ -42,6 +42,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..lighting import depth_maps
+from ..lighting.caustic_casters import bright_world
 from ..lighting.light_rates import LightRates, world_rate
 from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
 from ..lighting.maps_or_rays import compared
@@ -201,11 +202,14 @@ class EnvironmentLight(Technique):
             return
         shadows = _cast_shadows(frame)
         points, patches = [], self._patches(frame)
+        bright = bright_world(frame)
         numbers = list(rate.points(frame.sample))
         chosen = np.array([frame.random_at(number, "environment") for number in numbers]).reshape(-1, 2)
         for number, direction, radiance, density in zip(numbers, *frame.environment.draw(*chosen.T), strict=True):
+            blocked = bright is not None and bright.holds(radiance)
+            asked = flags + lights.GLASS_BLOCKS_FLAG * blocked
             if patches is not None:
-                points.append(_patch(frame, patches, flags, rate, number, direction, radiance, density, shadows))
+                points.append(_patch(frame, patches, asked, rate, number, direction, radiance, density, shadows))
                 continue
             views = []
             if shadows and not self._traced:
@@ -213,8 +217,9 @@ class EnvironmentLight(Technique):
                     *frame.random_at(number, "map/environment"), *frame.random_at(number, "map/environment/turn")
                 )  # fmt: skip
                 views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, jitter, resolution)
+                views = [replace(view, glass_blocks=True) for view in views] if blocked else views
             row = lights.direction_row(
-                direction, radiance / density, density, flags, 0, len(views) or self._traced, rate.per_sample,
+                direction, radiance / density, density, asked, 0, len(views) or self._traced, rate.per_sample,
                 float(frame.environment.openness(direction)),
             )  # fmt: skip
             points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
@@ -290,7 +295,8 @@ class EnvironmentLight(Technique):
         denoised = frame.plan.runs("denoise")
         # Maps ask the material of a layer itself; rays know it by cells.
         layered = any(material.transparent for material in frame.materials.compiled)
-        if useful is None or asked or layered or not denoised or not frame.settings.whole:
+        told_apart = bright_world(frame) is not None  # a row stands for all directions, and glass stops some of them
+        if useful is None or asked or layered or told_apart or not denoised or not frame.settings.whole:
             return None
         moments = frame.environment.guide_moments()
         own, shared = world_tiles.variances(useful, moments)
@@ -338,6 +344,8 @@ def _patch(
         None, lights.SUN, flags, direction, half, radiance, 1.0 / density, -direction, 0.0, zero, zero, zero
     )
     views = provider.views(frame, sun, direction, number, 1.0) if shadows else []
+    if flags & lights.GLASS_BLOCKS_FLAG:
+        views = [replace(view, glass_blocks=True) if hasattr(view, "glass_blocks") else view for view in views]
     return LightPoint(sun.row(direction, 0, len(views), rate=rate.per_sample), provider, views)
 
 

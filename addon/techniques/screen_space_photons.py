@@ -19,7 +19,7 @@ place of a mask's pyramid, and all photons kept with their weight in place of ro
 
 Bias, in diffuse indirect: as photons.py says. Receivers reflect evenly by their albedo; what glossy lobes mirror of
 a caustic is left out. Caustics seen in mirrors and through glass come from maps (lighting/caustic_maps.py).
-Light of the world and of emissive meshes passes casters straight.
+What of the world's light is not much brighter than its mean passes casters straight.
 
 Fails: above 4 million triangles nothing is traced.
 """

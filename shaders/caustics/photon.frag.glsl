@@ -139,6 +139,10 @@ void main()
   float path = bends ? 1.0 : 2.0;
   vec3 position = s.position;
   float travelled = 0.0;
+  // How far the photon ends from here if it comes from beside this point of the light, of which samples leave that to it:
+  // the angle between such ways, which faces bend as they bend light, and their distance.
+  float apart_angle = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) / (bends ? s.glossy_ior : 1.0);
+  float apart = 0.0;
   float blur_squared = 0.0;
   uint salt = uint(photon_roll);
   for (int step = 0; step <= photon_light.interfaces; step++) {
@@ -150,6 +154,7 @@ void main()
     }
     position = origin + t * onward;
     travelled += t;
+    apart += apart_angle * t;
     flux *= passing_media(origin, onward, t);
     blur_squared += lobe_spread * lobe_spread * t * t;
     vec3 normal = triangle_normal(hit);
@@ -169,11 +174,10 @@ void main()
     flux *= (solid >= 0) ? exp(-interface_table_fetch(ivec2(2, solid)).rgb * t) : vec3(1.0);
 #endif
     if (!is_glass && !mirrors) {
-      // The end. Light spreads by the light's extent as by its distance; parallel light by its angle.
-      float light_spread = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
+      // The end.
       float lobes = photon_light.spread.y * photon_light.spread.y * blur_squared;
       out_point = vec4(position, 1.0 + mod(path * 37.0 + float(material), PATHS));
-      out_normal = vec4((dot(normal, onward) > 0.0) ? -normal : normal, sqrt(light_spread * light_spread + lobes));
+      out_normal = vec4((dot(normal, onward) > 0.0) ? -normal : normal, sqrt(apart * apart + lobes));
       out_flux = vec4(flux, width * (parallel ? 1.0 : (away + travelled) / away));
       return;
     }
@@ -198,6 +202,7 @@ void main()
         weight *= passes ? photon_light.passing[min(step, 3)] : photon_light.mirroring;
       }
       weight /= passes ? ior * ior : 1.0;
+      apart_angle /= passes ? ior : 1.0;
       lobe_spread = max(lobe_spread, interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, passes, ior));
     }
     else {
