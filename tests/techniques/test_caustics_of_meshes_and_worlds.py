@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.techniques.test_caustics import BALL_LENS, PHOTONS, ball, glass, light_through_a_ball, rings, slab, within
+from tests.techniques.test_caustics import BALL_LENS, ball, glass, light_through_a_ball, rings, slab, within
 
 EDGES = np.array([0.0, 0.18, 0.3])
 CAP, ROWS = 100.0, 64  # radiance about the zenith, in the uppermost row of an image
