@@ -6,9 +6,9 @@ socket's own value. What a varnish over a diffuse surface mirrors stays with ind
 
 A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. So are emissive meshes,
 and, where there is glass, the bright part of the world (sources/bright_world.py): the rest of it is wide light, which
-clear glass leaves as it is. Shadow rays of what is answered for take glass as opaque: what passes it arrives as photons
-of it. All glass counts there, so a pane beside a lens is a caster, too. A scene in which all glass is flat panes and nothing
-else throws caustics is left to straight light, as is right for panes.
+clear glass leaves as it is. Shadow rays of what is answered for take glass as opaque: what passes it arrives as
+photons of it. All glass counts there, so a pane beside a lens is a caster, too. A scene in which all glass is flat
+panes and nothing else throws caustics is left to straight light, as is right for panes.
 
 Blender's switches: with Reflective or Refractive caustics off (Cycles' Light Paths), reflected or refracted light is
 left out, but for glass with Shadow Caustics: objects set to cast them, under lights set to give them. Where the Cycles
