@@ -150,6 +150,29 @@ bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
   return min(behind.x, behind.y) > 0.0;
 }
 
+// The texel that decides for a receiver (from the view's corner): that in which it lies. Where its middle looks past the edge
+// of the receiver's surface, on what lies beyond, it knows nothing of what stands before that surface: in the corner of a
+// room it would let the light of the sky in. Then the nearest of its neighbours that is not so.
+vec2 shadow_cell(ShadowReceiver r)
+{
+  vec2 most = vec2(r.rectangle.z - 1.0);
+  vec2 own = min(floor(r.texel), most);
+  vec2 off = r.texel - own - 0.5;
+  vec2 side = vec2((off.x > 0.0) ? 1.0 : -1.0, (off.y > 0.0) ? 1.0 : -1.0);
+  vec2 nearer = (abs(off.x) > abs(off.y)) ? vec2(side.x, 0.0) : vec2(0.0, side.y);
+  for (int k = 0; k < 4; k++) {
+    vec2 cell = own + (((k & 1) != 0) ? nearer : vec2(0.0)) + (((k & 2) != 0) ? side - nearer : vec2(0.0));
+    cell = clamp(cell, vec2(0.0), most);
+    vec4 caster = shadow_caster(r, ivec2(r.rectangle.xy + cell));
+    vec2 offset = r.texel - cell - 0.5;
+    float height = caster.x - r.q + max(dot(caster.yz, offset), dot(r.gradient, offset));
+    if (caster.w > 0.0 && height >= -r.slack) {
+      return cell;
+    }
+  }
+  return own;
+}
+
 float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal, bool layers)
 {
   ShadowReceiver r;
@@ -157,5 +180,5 @@ float shadow_visibility(int first_view, int view_count, vec3 position, vec3 norm
     return 1.0;
   }
   r.layers = layers;
-  return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
+  return shadow_blocked(r, shadow_cell(r), normal) ? 0.0 : 1.0;
 }

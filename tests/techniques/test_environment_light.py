@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.lighting.maps_or_rays import Compared
 from addon.sources.rates import Rate
 from addon.techniques import environment_light
 from tests.techniques.conftest import places
@@ -115,6 +116,18 @@ def test_k_times_the_worlds_strength_is_k_times_the_picture(floor):
     one = floor.render(4)["combined"][..., :3]
     next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Strength"].default_value = 4.0
     np.testing.assert_allclose(floor.render(4)["combined"][..., :3], one * 4, rtol=1e-5)
+
+
+def test_no_light_of_the_sky_comes_in_through_the_corners_of_walls_without_thickness(stage, monkeypatch):
+    """One open box within another that is open on the other side: what the camera sees inside has no way to the sky."""
+    monkeypatch.setattr(Compared, "by_rays", False)
+    for half, lacking in ((0.5, 1), (0.65, -1)):
+        corners = [(x, y, z) for x in (-half, half) for y in (-half, half) for z in (-half, half)]
+        faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 2, 6, 4), (1, 5, 7, 3), (2, 3, 7, 6) if lacking < 0 else (0, 4, 5, 1)]
+        stage.mesh(corners, faces, material=stage.diffuse())
+    stage.camera((0.03, 0.3, 0.01), (np.pi / 2, 0, np.pi), angle=1.6)
+    stage.world()
+    assert stage.render(16, (64, 48))["combined"][..., :3].max() == 0
 
 
 def test_a_world_hidden_from_the_camera_still_gives_light(stage):
