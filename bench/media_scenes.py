@@ -19,10 +19,10 @@ def begin() -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     camera("Camera", (0, -6, 1.5), SIDE_VIEW)
     bpy.context.scene.world = bpy.data.worlds.new("World")
-    _background().inputs["Color"].default_value = (0, 0, 0, 1)
+    background().inputs["Color"].default_value = (0, 0, 0, 1)
 
 
-def _background():
+def background():
     return node_of(bpy.context.scene.world, "BACKGROUND")
 
 
@@ -177,7 +177,7 @@ def fire() -> None:
 
 def foggy_world() -> None:
     floor()
-    _background().inputs["Color"].default_value = (0.5, 0.6, 0.8, 1)
+    background().inputs["Color"].default_value = (0.5, 0.6, 0.8, 1)
     box((-0.5, 0.5, 0), (0.5, 1.5, 2.0), diffuse(0.7, 0.3, 0.2))
     box((-2, -1, 0), (-1.2, -0.2, 1.0), diffuse(0.2, 0.5, 0.3))
     box((-5, -5, 0.01), (5, 5, 2.5), volume(Density=0.15, Color=(0.9, 0.9, 0.9, 1)))
@@ -219,7 +219,7 @@ def thin_smoke() -> None:
 def spot_through_glass() -> None:
     floor()
     box((-2, -2, 0.01), (2, 2, 3.6), volume(Density=0.15, Color=(0.9, 0.9, 0.9, 1)))
-    _ball(0.5, material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0), (0, 0, 1.8))
+    ball(0.5, material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0), (0, 0, 1.8))
     lamp("SPOT", (0, 0, 3.5), 300, spot_size=0.7, shadow_soft_size=0.05)
 
 
@@ -233,7 +233,7 @@ def camera_inside() -> None:
     box((-6, -8, -0.1), (6, 4, 4), volume(Density=0.2, Color=(0.85, 0.9, 0.95, 1), Anisotropy=0.2))
 
 
-def _ball(radius: float, shade, location) -> None:
+def ball(radius: float, shade, location) -> None:
     bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=radius, location=location)
     made = bpy.context.object
     for face in made.data.polygons:
@@ -250,7 +250,7 @@ def _fog_cube(anisotropy: float) -> None:
 def _lens(anisotropy: float) -> None:
     camera("Side", (0, -7, 0), SIDE_VIEW, 0.55)
     _fog_cube(anisotropy)
-    _ball(0.5, material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0), (0, 0, 0.5))
+    ball(0.5, material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0), (0, 0, 0.5))
     lamp("SPOT", (0, 0, 3.4), 400, spot_size=0.7, shadow_soft_size=0.05)
 
 

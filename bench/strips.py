@@ -127,6 +127,31 @@ def _grass_by_map(name: str) -> None:
     grass.camera((0.0, -5.5, 2.9), (np.radians(71.0), 0.0, 0.0), angle=0.7)
 
 
+def _for_eevee(_: str) -> None:
+    """A room as made for EEVEE: a blended pane, dithered leaves, a wall of which only the outside is to be seen, glass
+    that refracts by ray tracing, a lamp with a custom distance."""
+    from bench import media_scenes as scenes
+    from bench.shading import one_shader
+
+    scenes.begin()
+    scenes.camera("Camera", (0.0, -6.5, 2.2), (np.radians(78.0), 0.0, 0.0), 0.75)
+    scenes.floor(0.6, 5.0)
+    pane = one_shader("Pane", "ShaderNodeBsdfPrincipled", Base_Color=(0.1, 0.4, 0.8, 1), Alpha=0.4, Roughness=0.4)
+    leaves = one_shader("Leaves", "ShaderNodeBsdfPrincipled", Base_Color=(0.15, 0.5, 0.1, 1), Alpha=0.6, Roughness=0.8)
+    wall = one_shader("Wall", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.35, 0.2, 1))
+    glass = one_shader("Glass", "ShaderNodeBsdfPrincipled", Transmission_Weight=1.0, Roughness=0.0, IOR=1.45)
+    pane.surface_render_method, leaves.surface_render_method = "BLENDED", "DITHERED"
+    wall.use_backface_culling = glass.use_raytrace_refraction = True
+    scenes.box((-2.4, -0.02, 0.0), (-1.0, 0.02, 1.8), pane)
+    scenes.box((1.0, 0.4, 0.0), (2.2, 0.42, 1.6), leaves)
+    scenes.ball(0.6, glass, (0.0, -0.6, 0.6))
+    front = scenes.box((-2.8, -2.5, 0.0), (2.8, 2.5, 3.2), wall)
+    front.data.flip_normals()
+    lamp = scenes.lamp("AREA", (1.5, -1.5, 3.0), 180.0, (np.radians(25.0), np.radians(20.0), 0.0), size=1.0)
+    lamp.data.use_custom_distance, lamp.data.cutoff_distance = True, 40.0
+    scenes.background().inputs["Color"].default_value = (0.15, 0.18, 0.24, 1)
+
+
 NO_BOUNCES = ("slot_indirect", "OFF")
 CYCLES = Entrant("CYCLES", 128)
 STRIPS = {
@@ -149,6 +174,17 @@ STRIPS = {
     ),
     "grass_by_map": Strip(
         (160, 112), ("ball", "ring"), _grass_by_map, (Entrant("CANDELA", 16, (NO_BOUNCES,)),), own_exposure=False
+    ),
+    "from_eevee": Strip(
+        (240, 160),
+        ("room",),
+        _for_eevee,
+        (
+            Entrant("BLENDER_EEVEE", 32),
+            Entrant("CYCLES", 64),
+            Entrant("CANDELA", 16),
+            Entrant("CANDELA", 16, (("use_backface_culling", True),)),
+        ),
     ),
     "media": Strip(
         (128, 128),
