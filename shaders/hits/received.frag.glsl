@@ -166,13 +166,12 @@ void main()
                             r.surface.glossy_tint, r.surface.glossy_edge.x > 0.5, r.surface.glossy_weight, vec3(0.0));
 #endif
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + ray_number);
-  // In mirrors light from below the surface takes the place of what a diffuse one would send. Behind glass it does not: points of
-  // milk in a glass are lit as if that were a clear layer, by a third too much.
+  // Light from below the surface takes the place of what a diffuse one would send.
   vec3 diffuse = r.surface.diffuse;
   vec3 sent;
   vec3 part;
   vec3 same;
-  bool leaves = path_is_glossy(code) && light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, roll.y, sent, part, same);
+  bool leaves = light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, roll.y, sent, part, same);
   vec3 straight = leaves ? diffuse * (vec3(1.0) - part) : diffuse;
   vec3 onward = leaves ? diffuse * (vec3(1.0) - part * (vec3(1.0) - same)) : diffuse;
   vec3 sum = leaves ? float(repeats) * diffuse * part * sent : vec3(0.0);

@@ -36,3 +36,22 @@ def test_a_mirror_shows_light_that_comes_through(stage):
 
     # Cycles 5.2, 64 samples
     assert mirrored == pytest.approx((0.0253, 0.0468, 0.0498), rel=0.4)
+
+
+@pytest.mark.slow
+def test_glass_shows_light_that_comes_through(stage):
+    """A slab of skin lit from behind, by way of a pane: what leaves it, less what two interfaces reflect. A diffuse one
+    is black there."""
+    skin = scattering(stage, "RANDOM_WALK_SKIN", 2.0, radius=(1, 0.6, 0.3), color=(0.9, 0.7, 0.4))
+    stage.rectangle((-2, -2), (2, 2), material=skin)
+    stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = 0.15
+    stage.light("SUN", turn=(np.pi - 1.0, 0, 0), energy=np.pi)
+    stage.camera((0, 0, 4), (0, 0, 0), 0.3)
+    plain = shown(stage.render(8, size=(16, 16), bounces=1)).mean(axis=(0, 1))
+    glass = stage.principled(Base_Color=(1, 1, 1, 1), Transmission_Weight=1, Roughness=0, IOR=1.45)
+    pane = stage.rectangle((-2, -2), (2, 2), 2.0, material=glass)
+    pane.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1
+    behind = shown(stage.render(8, size=(16, 16), bounces=1)).mean(axis=(0, 1))
+    reflected = (0.45 / 2.45) ** 2
+    assert plain.min() > 0.05
+    assert behind == pytest.approx((1 - reflected) / (1 + reflected) * plain, rel=0.15)
