@@ -68,3 +68,19 @@ def test_a_lens_blurs_as_that_of_cycles(stage):
     error, own, _ = off(stage)
     assert error.mean() < 0.01
     assert np.abs(own - sharp).max() > 0.1
+
+
+def test_inside_an_evenly_lit_ball_all_directions_are_alike(stage):
+    """A lamp of intensity I in the middle of a ball of radius r lights each place with I / r^2, of which the albedo over
+    pi is seen: nothing else where the tiles meet by which surfaces are drawn."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=2.0)
+    ball = bpy.context.object
+    ball.data.flip_normals()
+    ball.data.shade_smooth()
+    ball.data.materials.append(stage.diffuse(0.5))
+    stage.light("POINT", location=(0, 0, 0), shadow_soft_size=0.0, energy=100.0)
+    stage.camera((0, 0, 0), (np.pi / 2, 0, 0.3))
+    lens = stage.scene.camera.data
+    lens.type, lens.panorama_type = "PANO", "EQUIRECTANGULAR"
+    seen = stage.render(1, (48, 24))["combined"][..., :3]
+    np.testing.assert_allclose(seen, 0.5 / np.pi * 100.0 / (4 * np.pi) / 2.0**2, rtol=0.005)
