@@ -71,8 +71,8 @@ def test_a_lens_blurs_as_that_of_cycles(stage):
 
 
 def test_inside_an_evenly_lit_ball_all_directions_are_alike(stage):
-    """A lamp of intensity I in the middle of a ball of radius r lights each place with I / r^2, of which the albedo over
-    pi is seen: nothing else where the tiles meet by which surfaces are drawn."""
+    """A lamp of intensity I in the middle of a ball of radius r lights each place with I / r^2, of which albedo / pi is
+    seen: nothing else where the tiles meet by which surfaces are drawn."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=2.0)
     ball = bpy.context.object
     ball.data.flip_normals()
