@@ -27,7 +27,8 @@ CORNEA, LENS, VITREOUS = 0.49, 0.41, 0.10  # shares of the scattering
 CORNEA_COUNT, LENS_COUNT, VITREOUS_COUNT = 400, 750, 1700
 YOUNG = 25.0  # years, to which `scatter` refers
 FIBRE_RADIUS = 0.012  # mm
-STROKE = 8  # floats of one: x, y, x, y, radius, radius, opacity, nothing
+STROKE = 8  # floats of one: x, y, x, y, radius, radius, opacity, plane
+FRONT, MIDDLE, BACK = 0, 1, 2  # planes: cornea and lids; pupil and lens; vitreous body
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Eye:
     seed: int = 0
     age: float = 30.0  # years
     pupil: float = 0.0  # mean diameter, mm; 0: by the luminance of what is seen
+    before: float = 0.0  # cd/m2 that it saw until `changed`; 0: what it sees now
+    changed: float = 0.0  # seconds: when light changed
     restlessness: float = 1.0  # of the pupil (hippus); 1: as measured
     tremor: float = 1.0  # of the lens
     movement: float = 1.0  # of the vitreous body
@@ -75,12 +78,14 @@ def older(age: float) -> float:
 def aperture_at(eye: Eye, seconds: float, luminance: float) -> Aperture:
     """The eye at a time, looking at a field of a mean luminance in cd/m2."""
     mean = eye.pupil or float(pupil.mean_diameter(luminance, eye.age))
+    if eye.before > 0.0 and not eye.pupil:
+        mean = pupil.adapting(seconds - eye.changed, float(pupil.mean_diameter(eye.before, eye.age)), mean)
     diameter = float(pupil.diameter_at(seconds, mean, eye.seed, eye.restlessness))
     blink = max(eye.blink, lids.blinking(seconds, eye.blinks_per_minute, eye.seed))
     closed = float(lids.closure(eye.squint, blink))
     open_before = lids.open_share(diameter, float(lids.closure(eye.squint, 0.0)))
     light = lids.open_share(diameter, closed) / max(open_before, 1e-6)
-    strokes = [_discs(*one) for one in _particles(eye, seconds, mean)]
+    strokes = [_discs(*one, plane) for plane, one in enumerate(_particles(eye, seconds, mean))]
     strokes += [_fibres(eye, seconds, mean), _lashes(eye, closed)]
     every = np.concatenate(strokes)
     half = 0.5 * diameter
@@ -124,8 +129,8 @@ def _sizes(count: int, seed: int, layer: int) -> np.ndarray:
     return 0.5 + np.random.default_rng((seed, 14, layer)).random(count)
 
 
-def _discs(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    return np.stack([x, y, x, y, radius, radius, np.ones_like(x), np.zeros_like(x)], axis=-1)
+def _discs(x: np.ndarray, y: np.ndarray, radius: np.ndarray, plane: int) -> np.ndarray:
+    return np.stack([x, y, x, y, radius, radius, np.ones_like(x), np.full_like(x, plane)], axis=-1)
 
 
 def _fibres(eye: Eye, seconds: float, mean: float) -> np.ndarray:
@@ -136,7 +141,7 @@ def _fibres(eye: Eye, seconds: float, mean: float) -> np.ndarray:
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     out = np.zeros((count, STROKE))
     out[:, 0:2], out[:, 2:4] = direction * ends[0], direction * ends[1]
-    out[:, 4:6], out[:, 6] = FIBRE_RADIUS, eye.fibres
+    out[:, 4:6], out[:, 6], out[:, 7] = FIBRE_RADIUS, eye.fibres, MIDDLE
     return out
 
 

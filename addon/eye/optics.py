@@ -2,6 +2,8 @@
 by step with the same definitions (addon/eye/point_spread.py, addon/eye/scatter.py).
 
     field      T exp(i pi dD (x^2 + y^2) / lambda)        a residual defocus of dD dioptres; Fraunhofer for 0
+    planes     field of the cornea, carried on to the pupil and from there to the vitreous body, what stands there
+               multiplied with it (Fresnel propagation, as the reference of the source has it), if asked for
     intensity  |F{field}|^2 at 575 nm, one texel = lambda / window in angle
     colours    sum over wavelengths of rgb(lambda) intensity(x 575 / lambda)
     kernel     the colours over the picture's pixels, box-averaged, each channel over its whole sum, and beneath the
@@ -15,18 +17,20 @@ at three degrees.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from . import lids, spectrum
-from .aperture import WINDOW, Aperture
+from .aperture import MIDDLE, WINDOW, Aperture
 
 NANOMETRE = 1e-6  # mm
 FADE_FROM = 0.5  # of the usable radius, where the pattern begins to fade out
 MOST_WAVELENGTHS = 256
 STEPS_PER_TEXEL = 0.68  # wavelengths per texel of radius that leave no gap between a ring and the next
 LEAST_CORE = 1.5  # pixels
+NO_EDGE = 100.0  # mm, of a pupil, and a closure of lids, that are beyond all that is drawn
 RIM = 1.5  # of the core's radius, where the tail has taken over
 
 
@@ -108,6 +112,34 @@ def field(open_part: np.ndarray, defocus: float, nanometres: float = spectrum.BA
     place = ((np.arange(side) + 0.5) / side - 0.5) * WINDOW
     r2 = place[None] ** 2 + place[:, None] ** 2
     return open_part * np.exp(1j * np.pi * defocus * 1e-3 * r2 / (nanometres * NANOMETRE))
+
+
+# How far the planes of aperture.py lie apart, mm, as in a beam that does not converge: dz fp^2 / (f1 f2) over the index
+# 1.336, f1 and f2 their distances from the retina (24, 20 and 10 mm), fp that of the pupil, in whose size all is drawn.
+APART = (4.0 * 20.0 / 24.0 / 1.336, 10.0 * 20.0 / 10.0 / 1.336)
+
+
+def carried(amplitude: np.ndarray, distance: float, nanometres: float = spectrum.BASE) -> np.ndarray:
+    """The field a distance (mm) further on, by Fresnel's transfer function."""
+    side = len(amplitude)
+    step = np.fft.fftfreq(side, WINDOW / side)
+    squared = step[None] ** 2 + step[:, None] ** 2
+    transfer = np.exp(-1j * np.pi * nanometres * NANOMETRE * distance * squared)
+    return np.fft.ifft2(np.fft.fft2(amplitude) * transfer)
+
+
+def through_planes(planes: Sequence[np.ndarray], defocus: float) -> np.ndarray:
+    """The amplitude behind the last of the planes' transmittances, each (side, side)."""
+    amplitude = field(planes[0], defocus)
+    for distance, open_part in zip(APART, planes[1:]):
+        amplitude = carried(amplitude, distance) * open_part
+    return amplitude
+
+
+def plane_of(aperture: Aperture, plane: int) -> Aperture:
+    """What stands in one plane: its strokes, and in the middle one pupil and lids."""
+    strokes = aperture.strokes[aperture.strokes[:, 7] == plane]
+    return replace(aperture, strokes=strokes) if plane == MIDDLE else Aperture(NO_EDGE, -NO_EDGE, strokes, 1.0)
 
 
 def intensity(amplitude: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ scattering in the human eye", Eurographics 2009; Ritschel 2009, chapter 8.
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,6 +62,19 @@ FIELD = passes.fullscreen_program(
     "eye/field.frag.glsl",
     textures=(("FLOAT_2D", "aperture"),),
     constants=(("FLOAT", "spacing_mm"), ("FLOAT", "window_mm"), ("FLOAT", "phase_per_mm2")),
+    outputs=(("VEC4", "out_field"),),
+)
+CARRY = passes.fullscreen_program(
+    "eye: field carried to the next plane",
+    "eye/carry.frag.glsl",
+    textures=(("RG32F", "field"),),
+    constants=(("FLOAT", "phase_per_step2"),),
+    outputs=(("VEC4", "out_field"),),
+)
+THROUGH = passes.fullscreen_program(
+    "eye: field behind a plane",
+    "eye/through.frag.glsl",
+    textures=(("RG32F", "field"), ("FLOAT_2D", "aperture")),
     outputs=(("VEC4", "out_field"),),
 )
 INTENSITY = passes.fullscreen_program(
@@ -167,10 +181,11 @@ def unit_square() -> geometry.Batch:
     return _kept["square"]
 
 
-def _spectrum() -> images.Image:
-    if "spectrum" not in _kept:
-        _kept["spectrum"] = images.upload(spectrum.table()[None])
-    return _kept["spectrum"]
+def _spectrum(light: str, kelvin: float) -> images.Image:
+    known = f"spectrum {light} {kelvin if light == spectrum.BLACKBODY else ''}"
+    if known not in _kept:
+        _kept[known] = images.upload(spectrum.table(light, kelvin)[None])
+    return _kept[known]
 
 
 @on_release
@@ -178,8 +193,9 @@ def _release() -> None:
     _kept.clear()
 
 
-def diffract(aperture: images.Image, defocus: float, target: images.Target) -> None:
-    """|F|^2 of an aperture (R16F, twice the side) into an R32F target, over the open square's light; see optics."""
+def diffract(aperture: images.Image, defocus: float, target: images.Target, *behind: images.Image) -> None:
+    """|F|^2 of an aperture (R16F, twice the side) into an R32F target, over the open square's light; see optics.
+    `behind`: what stands in planes behind it, optics.APART."""
     side = target.size[0]
     phase = np.pi * defocus * 1e-3 / (spectrum.BASE * optics.NANOMETRE)
     with images.borrowed(side, side, "RG32F") as field, images.borrowed(side, side, "RG32F") as spare:
@@ -187,16 +203,28 @@ def diffract(aperture: images.Image, defocus: float, target: images.Target) -> N
             FIELD, field, textures={"aperture": aperture},
             constants={"spacing_mm": WINDOW / side, "window_mm": WINDOW, "phase_per_mm2": phase},
         )  # fmt: skip
-        found, _ = fft.transform(field, spare)
+        found, spare = fft.transform(field, spare)
+        for distance, plane in zip(optics.APART, behind):
+            phase = np.pi * spectrum.BASE * optics.NANOMETRE * distance / WINDOW**2
+            passes.fullscreen(
+                CARRY, spare, textures={"field": found.colors[0]}, constants={"phase_per_step2": phase}
+            )  # fmt: skip
+            field, spare = fft.transform(spare, found, inverse=True)
+            passes.fullscreen(THROUGH, spare, textures={"field": field.colors[0], "aperture": plane})
+            found, spare = fft.transform(spare, field)
         # Within the range of floats whatever the side: the brightest texel is at most 1.
         constants = {"scale": float(side) ** -4}
         passes.fullscreen(INTENSITY, target, textures={"field": found.colors[0]}, constants=constants)
 
 
-def colour(pattern: images.Image, target: images.Target, least: int = 32, most: int = optics.MOST_WAVELENGTHS) -> None:
-    """White light's pattern from that of 575 nm; at least `least` wavelengths each, more further out up to `most`."""
+def colour(
+    pattern: images.Image, target: images.Target, least: int = 32, most: int = optics.MOST_WAVELENGTHS,
+    light: tuple[str, float] = (spectrum.EQUAL, 0.0),
+) -> None:  # fmt: skip
+    """A light's pattern from that of 575 nm; at least `least` wavelengths each, more further out up to `most`. `light`:
+    as spectrum.of_light takes it."""
     passes.fullscreen(
-        COLOURS, target, textures={"pattern": pattern, "spectrum": _spectrum()},
+        COLOURS, target, textures={"pattern": pattern, "spectrum": _spectrum(*light)},
         constants={
             "least": least, "most": max(most, least), "usable": optics.usable_radius(pattern.width),
             "fade_from": optics.FADE_FROM, "steps_per_texel": optics.STEPS_PER_TEXEL,
@@ -205,15 +233,21 @@ def colour(pattern: images.Image, target: images.Target, least: int = 32, most: 
 
 
 def make_pattern(
-    aperture: Aperture, side: int, defocus: float, least: int = 32, most=optics.MOST_WAVELENGTHS
-) -> Pattern:
-    """Everything up to the colours."""
+    aperture: Aperture, side: int, defocus: float, least: int = 32, most=optics.MOST_WAVELENGTHS,
+    light: tuple[str, float] = (spectrum.EQUAL, 0.0), planes: bool = False,
+) -> Pattern:  # fmt: skip
+    """Everything up to the colours. `planes`: what scatters stands in three planes instead of one."""
     fine = SUPERSAMPLING * side
     made = Pattern(images.pool.take(side, side, "RGBA32F"), images.pool.take(fine, fine, "R16F"))
     draw_aperture(aperture, images.Target((made.aperture,)))
     with images.borrowed(side, side, "R32F") as pattern:
-        diffract(made.aperture, defocus, pattern)
-        colour(pattern.colors[0], images.Target((made.colours,)), least, most)
+        with ExitStack() as taken:
+            apart = [taken.enter_context(images.borrowed(fine, fine, "R16F")) for _ in range(3 if planes else 0)]
+            for plane, target in enumerate(apart):
+                draw_aperture(optics.plane_of(aperture, plane), target)
+            diffract(*([one.colors[0] for one in apart[:1]] or [made.aperture]), defocus, pattern,
+                     *(one.colors[0] for one in apart[1:]))  # fmt: skip
+        colour(pattern.colors[0], images.Target((made.colours,)), least, most, light)
     return made
 
 
@@ -248,6 +282,6 @@ def make_kernel(pattern: images.Image, scale: optics.Scale, sharp: bool = True) 
     return made
 
 
-def pass_count(side: int) -> int:
+def pass_count(side: int, planes: bool = False) -> int:
     """Passes of `make_pattern`."""
-    return 5 + fft.pass_count(side, side)
+    return 5 + fft.pass_count(side, side) * (5 if planes else 1) + (10 if planes else 0)

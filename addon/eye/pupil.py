@@ -8,6 +8,9 @@ diameter would become negative. 0.1 gives 0.32 mm at 2.4 mm and 0.06 mm at 7 mm.
 
 With age pupils grow smaller: p + (age - 28.58) (0.02132 - 0.009562 p), and as they are at 20 for the young.
 
+After a change of light the pupil goes to its new mean, from `LATENCY` on, as 1 - exp(-t / tau); it closes three times
+as fast as it opens (Ellis 1981). `adapting` is that as a closed form of the time.
+
 Sources: Ritschel 2009, equation 8.2 (after Moon and Spencer 1944); age: Watson and Yellott 2012.
 """
 
@@ -22,6 +25,7 @@ AMPLITUDE = 0.1
 OFFSET = 1.0
 LEAST_LUMINANCE = 1e-3  # cd/m2; what is darker does not open the pupil further
 YOUNGEST, REFERENCE_AGE = 20.0, 28.58  # years
+LATENCY, CLOSING, OPENING = 0.25, 0.4, 1.2  # seconds; the latter two are time constants
 _HIPPUS = 1  # stream of noise
 
 
@@ -31,6 +35,14 @@ def mean_diameter(luminance, age: float = REFERENCE_AGE, offset: float = OFFSET)
     diameter = 4.9 - 3.0 * np.tanh(0.4 * light)
     older = max(age, YOUNGEST) - REFERENCE_AGE
     return np.clip(diameter + older * (0.02132 - 0.009562 * diameter), SMALLEST, LARGEST)
+
+
+def adapting(seconds: float, before: float, after: float) -> float:
+    """Mean diameter in mm so many seconds after light has changed, between those of both."""
+    if seconds <= LATENCY:
+        return before
+    tau = CLOSING if after < before else OPENING
+    return after + (before - after) * float(np.exp(-(seconds - LATENCY) / tau))
 
 
 def diameter_at(seconds, mean: float, seed: int, restlessness: float = 1.0) -> np.ndarray:

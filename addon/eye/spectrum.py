@@ -4,6 +4,10 @@ The colour matching functions are the fits of Wyman, Sloan and Shirley 2013 ("Si
 XYZ color matching functions"); XYZ to linear Rec. 709 by IEC 61966-2-1. A diffraction pattern of one wavelength holds
 for others scaled by their ratio, and its area grows as its square: `table` contains the factor (575 nm / wavelength)^2
 that keeps its energy.
+
+A lamp's own spectrum decides how far needles and rings disperse: `of_light` has those of a blackbody (Planck), of a
+white LED (a blue line of 455 nm and its phosphor), of a fluorescent tube (lines of mercury, europium and terbium) and
+of low-pressure sodium. Each channel's sum stays 1: a picture's own colours say how much red, green and blue a lamp has.
 """
 
 from __future__ import annotations
@@ -15,6 +19,13 @@ import numpy as np
 SHORTEST, RANGE, BASE = 380.0, 390.0, 575.0  # nm
 LARGEST_LOOKUP = BASE / SHORTEST  # how much further out than a pixel the shortest wavelength is looked up
 ENTRIES = 512
+EQUAL, BLACKBODY = "EQUAL", "BLACKBODY"
+LINES = {  # height, nm, standard deviation in nm: at least half the step of 32 wavelengths, which would miss narrower ones
+    "LED": ((1.0, 455.0, 10.0), (0.55, 560.0, 55.0)),
+    "FLUORESCENT": ((0.5, 436.0, 6.0), (0.35, 487.0, 6.0), (1.0, 545.0, 6.0), (0.3, 585.0, 8.0), (1.0, 611.0, 6.0)),
+    "SODIUM": ((1.0, 589.3, 6.0),),
+}  # fmt: skip
+LEAST_CHANNEL = 0.05  # of the luminance
 TO_REC709 = np.array([
     [3.2404542, -1.5371385, -0.4985314],
     [-0.9692660, 1.8760108, 0.0415560],
@@ -42,14 +53,32 @@ def xyz(nanometres) -> np.ndarray:
     return np.stack([lobes(fits) for fits in (_X, _Y, _Z)], axis=-1)
 
 
+def of_light(light: str, kelvin: float, nanometres) -> np.ndarray:
+    """Relative power of a kind of lamp at wavelengths; of a BLACKBODY at a temperature. KeyError: no such kind."""
+    nanometres = np.asarray(nanometres, np.float64)
+    if light == EQUAL:
+        return np.ones_like(nanometres)
+    if light == BLACKBODY:
+        exponent = 1.4388e7 / (nanometres * max(kelvin, 100.0))  # hc / k, nm K
+        away = exponent - exponent.min()
+        return (BASE / nanometres) ** 5 * np.exp(-away) / (1.0 - np.exp(-exponent))
+    height, middle, width = np.array(LINES[light]).T
+    return (height * np.exp(-0.5 * ((nanometres[..., None] - middle) / width) ** 2)).sum(-1)
+
+
 @cache
-def table() -> np.ndarray:
+def table(light: str = EQUAL, kelvin: float = 6500.0) -> np.ndarray:
     """(ENTRIES, 4) float32 at the middles of equal steps of the range: linear RGB with the factor of the area, and
-    575 nm over the wavelength."""
+    575 nm over the wavelength. `light`: as of_light takes it."""
     nanometres = wavelength((np.arange(ENTRIES) + 0.5) / ENTRIES)
     scale = BASE / nanometres
-    rgb = xyz(nanometres) @ TO_REC709.T
-    rgb = rgb / rgb.sum(axis=0) * ENTRIES  # white light of equal energy is this picture's white
+    power = of_light(light, kelvin, nanometres)[:, None]
+    matched = xyz(nanometres)
+    rgb = power * (matched @ TO_REC709.T)
+    if light != EQUAL:  # a channel that the lamp has hardly any of is as its luminance
+        seen = power * matched[:, 1:2]
+        rgb = np.where(rgb.sum(axis=0) > LEAST_CHANNEL * seen.sum(), rgb, seen)
+    rgb = rgb / rgb.sum(axis=0) * ENTRIES  # the light itself is this picture's white
     return np.concatenate([rgb * (scale**2)[:, None], scale[:, None]], axis=1).astype(np.float32)
 
 

@@ -13,7 +13,8 @@ The state is a closed form of the time: frame 40 is the same whether it is rende
 | kernel and its sums | 2 + 2 to 3 each | 16 per texel |
 
 The pupil follows the picture's own mean luminance, without the second or so that real ones take: a frame does not know
-the pictures before it. Bias and sources: addon/eye/point_spread.py.
+the pictures before it. *Luminance Before* and *Light Changes At* tell of one change, after which it adapts. Bias and
+sources: addon/eye/point_spread.py.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..eye import optics, point_spread
+from ..eye import optics, point_spread, spectrum
 from ..eye.aperture import Aperture, Eye, aperture_at
 from ..frame.picture import Frame
 from ..frame.settings import Settings
@@ -44,6 +45,18 @@ MODE = Param(
 LUMINANCE_STEP = 0.02  # decades; as much as noise of the first samples changes the mean, and 0.02 mm of a pupil
 DRAFT_SIDE = 256
 AUTO = "AUTO"
+ONE, THREE = "ONE", "THREE"
+PLANES = (
+    (ONE, "One", 0, "All in the plane of the pupil: fast"),
+    (THREE, "Three", 1, "Cornea, lens and vitreous body, light carried from one to the next: about twice the time"),
+)
+SPECTRA = (
+    (spectrum.EQUAL, "Equal Energy", 0, "All wavelengths alike"),
+    (spectrum.BLACKBODY, "Blackbody", 1, "Of a temperature: candle 1900, bulb 2800, sun 5800 kelvin"),
+    ("LED", "White LED", 2, "A blue line and a broad yellow"),
+    ("FLUORESCENT", "Fluorescent", 3, "Lines of blue, green and red: needles have separate colours"),
+    ("SODIUM", "Sodium", 4, "One yellow line: needles and rings without colours, and sharp"),
+)
 LEAST_SIDE, MOST_SIDE = 512, 2048  # of a pattern whose size follows from the brightness of the picture
 SIDES = (
     (AUTO, "Automatic", 0, "As large as the brightest light needs, so that its glare ends where nobody sees it"),
@@ -93,11 +106,13 @@ class PointSpread(Service):
         settings, technique = frame.settings, self._technique
         side, defocus = self._side, settings.get(technique, "defocus")
         least = settings.get(technique, "wavelengths")
-        key = (side, defocus, least, aperture.diameter, aperture.closed, aperture.strokes.tobytes())
+        light = settings.get(technique, "spectrum"), settings.get(technique, "kelvin")
+        planes = settings.get(technique, "planes") == THREE
+        key = (side, defocus, least, aperture.diameter, aperture.closed, aperture.strokes.tobytes(), light, planes)
         if self._pattern is None or self._pattern[0] != key:
             self._drop()
-            self._pattern = (key, point_spread.make_pattern(aperture, side, defocus, least))
-            frame.count(technique, "passes", point_spread.pass_count(side))
+            self._pattern = (key, point_spread.make_pattern(aperture, side, defocus, least, light=light, planes=planes))
+            frame.count(technique, "passes", point_spread.pass_count(side, planes))
             frame.count(technique, "obstacles", len(aperture.strokes))
         return self._pattern[1]
 
@@ -137,6 +152,16 @@ class EyeModel(Technique):
         Param(
             "pupil", "Pupil", 0.0,
             "Mean diameter of the pupil in mm; 0: by the luminance of the picture (Scene Luminance)", 0.0, 8.5,
+        ),
+        Param(
+            "before", "Luminance Before", 0.0,
+            "Mean luminance in cd/m² that the eye was used to before the light changed; 0: it is used to the picture",
+            0.0, 1e8,
+        ),
+        Param(
+            "changed", "Light Changes At", 0.0,
+            "Second of the scene's time at which the light changes, from which on the pupil adapts: within a second "
+            "where it closes, three where it opens",
         ),
         Param(
             "restlessness", "Hippus", 1.0,
@@ -180,6 +205,15 @@ class EyeModel(Technique):
             "Minimum number of wavelengths summed for each texel; more are used further out",
             8, 256,
         ),
+        Param(
+            "spectrum", "Spectrum", spectrum.EQUAL,
+            "Spectrum of the lamps that dazzle: how far their needles disperse into colours", items=SPECTRA,
+        ),
+        Param("kelvin", "Temperature", 2800.0, "Of a blackbody, in kelvin", 800.0, 20000.0),
+        Param(
+            "planes", "Planes", ONE,
+            "Where in the eye scatterers stand", items=PLANES,
+        ),
         Param("person", "Person", 0, "Seed of the observer's eye", 0, 2**20),
     )  # fmt: skip
     params = tuple(replace(param, scope=CAMERA) for param in params)
@@ -209,8 +243,9 @@ class EyeModel(Technique):
 def eye_of(settings: Settings) -> Eye:
     """The observer as set."""
     names = (
-        "age", "pupil", "restlessness", "tremor", "movement", "scatter", "fibres", "lashes", "squint", "blink",
-        "blinks_per_minute",
+        "age", "pupil", "before", "restlessness", "tremor", "movement", "scatter", "fibres", "lashes", "squint",
+        "blink", "blinks_per_minute",
     )  # fmt: skip
     values = {param.name: settings.value(EyeModel.name, param) for param in EyeModel.params}
-    return Eye(seed=values["person"], **{name: values[name] for name in names})
+    changed = values["changed"] * values["speed"]
+    return Eye(seed=values["person"], changed=changed, **{name: values[name] for name in names})

@@ -18,7 +18,7 @@ from ..gfx import context as gpu_context
 from ..gfx import images
 from ..gfx.context import turn
 from ..snapshot.camera import camera_of_scene
-from ..techniques.eye import EyeModel, eye_of
+from ..techniques.eye import THREE, EyeModel, eye_of
 from ..techniques.temporal_glare import TemporalGlare, degrees_per_pixel
 from . import ENGINE
 from .properties import block_of, settings_of
@@ -111,7 +111,11 @@ def pictures(scene, depsgraph, whole: bool = True) -> tuple[np.ndarray, np.ndarr
         defocus, max(width, height),
     )  # fmt: skip
     with turn:
-        pattern = point_spread.make_pattern(aperture, side, defocus, settings.get(technique, "wavelengths"))
+        pattern = point_spread.make_pattern(
+            aperture, side, defocus, settings.get(technique, "wavelengths"),
+            planes=settings.get(technique, "planes") == THREE,
+            light=(settings.get(technique, "spectrum"), settings.get(technique, "kelvin")),
+        )  # fmt: skip
         kernel = point_spread.make_kernel(pattern.colours, scale, sharp=not whole)
         weights = images.read(kernel.weights)
         fine = images.read(pattern.aperture)[..., :1]

@@ -22,6 +22,17 @@ def test_the_pupil_has_the_diameter_of_the_table(luminance, as_in_the_source, wi
     assert pupil.mean_diameter(luminance, offset=0.0) == pytest.approx(without_offset, abs=0.01)
 
 
+def test_the_pupil_adapts_faster_to_light_than_to_darkness():
+    """Nothing for a quarter of a second, then exponentially; at any time without those before it."""
+    eye = Eye(before=1.0, changed=2.0, restlessness=0.0)
+    dark, bright = (aperture_at(replace(eye, before=0.0), 0.0, light).diameter for light in (1.0, 1000.0))
+    at = [aperture_at(eye, 2.0 + after, 1000.0).diameter for after in (-1.0, 0.2, 0.65, 5.0)]
+    assert at[0] == at[1] == pytest.approx(dark)
+    assert at[2] == pytest.approx(bright + (dark - bright) * np.exp(-1.0)) and at[3] == pytest.approx(bright, abs=1e-3)
+    slower = aperture_at(replace(eye, before=1000.0), 2.65, 1.0).diameter
+    assert slower == pytest.approx(dark + (bright - dark) * np.exp(-1.0 / 3.0))
+
+
 def test_the_pupil_shrinks_with_light_and_with_age_and_knows_black():
     diameters = pupil.mean_diameter(np.geomspace(1e-5, 1e7, 200))
     assert (np.diff(diameters) <= 0).all()

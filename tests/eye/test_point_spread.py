@@ -195,3 +195,41 @@ def test_the_same_time_gives_the_same_pattern_to_the_bit(point_spread):
         pattern.release()
     np.testing.assert_array_equal(found[0], found[2])
     assert (found[0] != found[1]).any()
+
+
+def test_three_planes_are_those_of_numpy_and_keep_the_light(point_spread):
+    """What stands in cornea, lens and vitreous body, one behind the other."""
+    aperture = aperture_at(Eye(pupil=4.0), 0.5, 10.0)
+    apart = [drawn(point_spread, optics.plane_of(aperture, plane), 128) for plane in range(3)]
+    target = images.Target((images.create(128, 128, "R32F"),))
+    point_spread.diffract(apart[0], 0.25, target, *apart[1:])
+    found = images.read(target.colors[0])[..., 0].astype(np.float64) * 128**4
+    open_parts = [means(images.read(one)[..., 0]) for one in apart]
+    expected = optics.intensity(optics.through_planes(open_parts, 0.25))
+    assert relative_error(found, expected) < 1e-3
+    one = optics.intensity(optics.field(np.prod(open_parts, axis=0), 0.25))
+    assert expected.sum() == pytest.approx(one.sum(), rel=0.05)
+    y, x = np.mgrid[-64:64, -64:64]
+    tail = np.hypot(x, y) > 40  # texels: the core hardly knows where scatterers stand
+    assert relative_error(expected[tail], one[tail]) > 0.1
+
+
+def test_carried_light_is_a_fresnel_zone_plate_ago():
+    """A wide pupil's field after a distance: on the axis 2 sin of half the phase of its rim, as Fresnel has it."""
+    distance, radius = 2000.0, 1.6
+    aperture = Aperture(2 * radius, 0.0, np.zeros((0, 8), np.float32), 1.0)
+    found = optics.carried(optics.transmittance(aperture, 512).astype(complex), distance)
+    zones = np.pi * radius**2 / (575e-6 * distance)
+    assert np.abs(found[255:257, 255:257]).mean() == pytest.approx(2 * abs(np.sin(zones / 2)), abs=0.1)
+
+
+def test_a_lamps_spectrum_disperses_as_it_has_wavelengths():
+    """Channels keep their sum; a blackbody is brightest where Wien says, and sodium is one line."""
+    for light in ("LED", "FLUORESCENT", "SODIUM", "BLACKBODY"):
+        rows = spectrum.table(light, 3000.0).astype(np.float64)
+        np.testing.assert_allclose((rows[:, :3] / rows[:, 3:] ** 2).sum(axis=0) / len(rows), 1.0, atol=1e-4)
+    nanometres = spectrum.wavelength((np.arange(spectrum.ENTRIES) + 0.5) / spectrum.ENTRIES)
+    power = spectrum.of_light("BLACKBODY", 5000.0, nanometres)
+    assert nanometres[power.argmax()] == pytest.approx(2.8978e6 / 5000.0, abs=1.0)  # Wien
+    sodium = np.abs(spectrum.table("SODIUM")[:, 1])
+    assert np.abs(nanometres[sodium > 0.01 * sodium.max()] - 589.3).max() < 20.0
