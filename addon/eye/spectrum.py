@@ -20,7 +20,8 @@ SHORTEST, RANGE, BASE = 380.0, 390.0, 575.0  # nm
 LARGEST_LOOKUP = BASE / SHORTEST  # how much further out than a pixel the shortest wavelength is looked up
 ENTRIES = 512
 EQUAL, BLACKBODY = "EQUAL", "BLACKBODY"
-LINES = {  # height, nm, standard deviation in nm: at least half the step of 32 wavelengths, which would miss narrower ones
+# Height, nm, standard deviation in nm: at least half the step of 32 wavelengths, which would miss narrower ones.
+LINES = {
     "LED": ((1.0, 455.0, 10.0), (0.55, 560.0, 55.0)),
     "FLUORESCENT": ((0.5, 436.0, 6.0), (0.35, 487.0, 6.0), (1.0, 545.0, 6.0), (0.3, 585.0, 8.0), (1.0, 611.0, 6.0)),
     "SODIUM": ((1.0, 589.3, 6.0),),
