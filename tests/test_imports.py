@@ -189,3 +189,20 @@ def test_breach_is_found(module, source):
 )
 def test_allowed_import_passes(module, source):
     assert not breaches(ADDON / module, source)
+
+
+def test_scene_asks_a_frame_for_its_scene_alone():
+    """What has a parameter `frame` says that it is a SceneOnGpu, and reads nothing that this does not declare."""
+    declared = ast.parse((ADDON / "scene" / "on_gpu.py").read_text(encoding="utf-8")).body
+    (protocol,) = (one for one in declared if isinstance(one, ast.ClassDef) and one.name == "SceneOnGpu")
+    known = {getattr(one, "name", None) or one.target.id for one in protocol.body[1:]}
+    for path in sorted((ADDON / "scene").glob("*.py")):
+        for made in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(made, ast.FunctionDef):
+                continue
+            frames = [argument for argument in made.args.args if argument.arg == "frame"]
+            assert all(ast.unparse(one.annotation or ast.Constant(None)) == "SceneOnGpu" for one in frames), path.name
+            if frames:
+                read = {one.attr for one in ast.walk(made) if isinstance(one, ast.Attribute)
+                        and isinstance(one.value, ast.Name) and one.value.id == "frame"}  # fmt: skip
+                assert read <= known, f"{path.name}: {made.name} reads {read - known} of a frame"

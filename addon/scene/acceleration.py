@@ -35,6 +35,7 @@ from . import box_tree
 from .box_tree import LEAF
 from .instance_tree import MOST_BOXES, OWN_TREE, RECORD_NODES, Copies, UpperTree, is_point, kept, parted
 from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
+from .on_gpu import SceneOnGpu
 from .traced_triangles import (
     ALL_RAYS,
     is_empty,
@@ -279,7 +280,7 @@ class HierarchyCache:
         self._kinds: tuple[object, dict] = (None, {})  # of instances: one for each visibility among them
         self._looks: tuple[object, tuple] = (None, ())  # of materials: what decides about rays, and what they emit
 
-    def get(self, frame, path: str, passing: frozenset[int] = frozenset()) -> Hierarchy | None:
+    def get(self, frame: SceneOnGpu, path: str, passing: frozenset[int] = frozenset()) -> Hierarchy | None:
         """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`).
         Objects of the groups of blockers `passing` are left out."""
         snapshot, origin, settings = frame.snapshot, frame.geometry.origin, frame.settings

@@ -27,6 +27,7 @@ import numpy as np
 
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance
+from .on_gpu import SceneOnGpu
 from .point_tree import arranged, parting
 from .traced_triangles import coverage, world_triangles
 
@@ -49,7 +50,7 @@ class Surfaces:
     rate: np.ndarray | float = 1.0
 
     @classmethod
-    def of(cls, frame) -> Surfaces:
+    def of(cls, frame: SceneOnGpu) -> Surfaces:
         """Of the frame's snapshot."""
         shown, meshes = shown_of(frame), frame.geometry.placed[1]
         maps = frame.opacity_maps, frame.emission_maps
@@ -75,7 +76,7 @@ class Surfaces:
         return np.where(np.isfinite(areas), areas, 0.0)
 
 
-def shown_of(frame) -> tuple[Instance, ...]:
+def shown_of(frame: SceneOnGpu) -> tuple[Instance, ...]:
     """Instances of the frame's snapshot that have points."""
     instances, meshes, _ = frame.geometry.placed
     return tuple(one for one in instances if one.visibility.diffuse and meshes[one.mesh].triangle_count)

@@ -35,6 +35,7 @@ from ..materials.compiler import may_walk
 from ..materials.translucency import maps_of
 from ..materials.working_space import current
 from ..snapshot.scene import Instance, Snapshot
+from .on_gpu import SceneOnGpu
 from .pieces import octahedral
 from .scatter_surface import ROW, RUNS, Surface, Voxels
 
@@ -78,7 +79,7 @@ class ScatterPoints:
         self._materials = np.zeros(0)  # of each cell
         self.near: images.Image | None = None  # voxels: 1 + number of the cell that faces +x, -x, +y; -y, +z, -z
 
-    def update(self, frame, most: int) -> bool:
+    def update(self, frame: SceneOnGpu, most: int) -> bool:
         """Make points anew if surfaces moved or scatter otherwise; True if so. At most `most` cells in all."""
         snapshot, materials = frame.snapshot, frame.materials.compiled
         placed = frame.geometry.placed[0]  # shaders look objects up by rows of the geometry's image

@@ -19,6 +19,7 @@ import numpy as np
 from ..gfx import images, passes
 from . import acceleration
 from .area_points import Surfaces, spread
+from .on_gpu import SceneOnGpu
 from .view import VIEW
 
 POINTS, RAYS, LEAST = 4096, 24, 0.01
@@ -35,7 +36,7 @@ SEES = passes.fullscreen_program(
 )
 
 
-def seen_sides(frame) -> dict[int, np.ndarray]:
+def seen_sides(frame: SceneOnGpu) -> dict[int, np.ndarray]:
     """By id of the instance (T, 2) bool, for each triangle of its mesh whether its front, by its winding in the world,
     and its back see anything. Instances that rays of the diffuse path do not meet are left out."""
     surfaces = Surfaces.of(frame)
@@ -44,7 +45,7 @@ def seen_sides(frame) -> dict[int, np.ndarray]:
     return {id(one): part for one, part in zip(surfaces.shown, parts)}
 
 
-def seen_triangles(frame, surfaces: Surfaces) -> np.ndarray:
+def seen_triangles(frame: SceneOnGpu, surfaces: Surfaces) -> np.ndarray:
     """The same of all triangles, (T, 2)."""
     points = spread(surfaces, POINTS, 0)
     seen = np.ones((len(surfaces.owner), 2), bool)
@@ -73,7 +74,7 @@ def _fill(seen: np.ndarray, known: np.ndarray, owner: np.ndarray) -> None:
     seen[unknown] = found[0] | found[1] | ~(own[0] | own[1])[:, None]
 
 
-def _share_that_meets(frame, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def _share_that_meets(frame: SceneOnGpu, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """(N, 2) of the rays from the front and the back of points."""
     size = (ROW, 2 * POINTS // ROW)
     rows = [np.zeros((2 * POINTS, 4), np.float32) for _ in range(2)]

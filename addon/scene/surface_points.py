@@ -21,6 +21,7 @@ import numpy as np
 
 from ..gfx import images
 from ..sampling.sequence import bits
+from .on_gpu import SceneOnGpu
 from .pieces import halved, octahedral
 from .traced_triangles import coverage, world_triangles
 
@@ -52,7 +53,7 @@ class SurfacePoints:
         self.triangles = self.points = 0
         self._key: object = None
 
-    def update(self, frame, points: int, distance: float) -> bool:
+    def update(self, frame: SceneOnGpu, points: int, distance: float) -> bool:
         """Make runs of `points` points anew if geometry or alpha differ, or `distance`, m, of what is seen does much.
         True if so."""
         reach = float(np.exp2(np.ceil(np.log2(4 * max(distance, 1e-30)))))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .on_gpu import SceneOnGpu
 from .pieces import areas_and_normals, halved
 from .seen import UNSEEN
 from .surfel_cells import MOST_PIECES, ROUNDS, Cells, distance_share, sampled
@@ -32,7 +33,7 @@ class Surface:
     share: float = 1.0  # of its area that counts
 
     @classmethod
-    def of(cls, frame, instance, materials) -> Surface:
+    def of(cls, frame: SceneOnGpu, instance, materials) -> Surface:
         snapshot, maps = frame.snapshot, frame.opacity_maps
         mesh, linear = snapshot.meshes[instance.mesh], instance.matrix[:3, :3].astype(np.float64)
         left, scales, right = np.linalg.svd(linear)

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..gfx import images
+from .on_gpu import SceneOnGpu
 from .seen import seen_sides
 from .surfel_cells import MEMBERS, NOTHING, Cells, sampled
 from .surfel_surfaces import Surface, together
@@ -47,7 +48,7 @@ class Surfels:
         self.node_count = self.receiver_count = 0
         self.changes = 0
 
-    def update(self, frame, budget: int, distance: float) -> bool:
+    def update(self, frame: SceneOnGpu, budget: int, distance: float) -> bool:
         """About `budget` receivers, made anew where surfaces moved or `distance`, m, of what is seen differs much; True
         if so."""
         snapshot, materials, origin = frame.snapshot, frame.measured_materials, frame.geometry.origin
@@ -131,7 +132,7 @@ class Surfels:
         self.__init__()
 
 
-def _reach(frame, distance: float) -> tuple[float, np.ndarray]:
+def _reach(frame: SceneOnGpu, distance: float) -> tuple[float, np.ndarray]:
     """Beyond what distance from which place area counts less; of scenes no larger than what is seen, nowhere."""
     reach = float(np.exp2(np.ceil(np.log2(1.5 * max(distance, 1e-30)))))
     if not frame.geometry.size > 8.0 * reach:
