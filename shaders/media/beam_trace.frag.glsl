@@ -10,6 +10,7 @@
 #include "trace/rays.glsl"
 
 #define INTERFACES 10
+#define MIRRORED_SHARE 0.25  // at least, of rays at the first two interfaces of glass
 #define LEAST_BEAM 1e-3  // of light: where media have taken more, a beam that leaves the scene ends
 
 float dielectric(float cosine, float ior)
@@ -54,7 +55,7 @@ bool within_media(inout vec3 from, inout vec3 to)
 }
 
 // By how much a mirror spreads light, for each unit of a beam's width: twice the curvature in the plane of incidence over
-// the cosine, and times it across, in the mean. Of one that is hollow nothing, as it gathers light.
+// the cosine, and times it across, in the mean. Of one that is hollow below zero, as it gathers light.
 float mirrored_spread(ivec2 hit, vec3 position, vec3 normal, vec3 direction, float width)
 {
   float cosine = max(-dot(normal, direction), 0.1);
@@ -70,7 +71,7 @@ float mirrored_spread(ivec2 hit, vec3 position, vec3 normal, vec3 direction, flo
   float side = (dot(here, normal) < 0.0) ? -1.0 : 1.0;
   float within = side * dot(triangle_shading_normal(hit, position + apart * along) - here, along) / apart;
   float beside = side * dot(triangle_shading_normal(hit, position + apart * across) - here, across) / apart;
-  return max(within / cosine + beside * cosine, 0.0);
+  return within / cosine + beside * cosine;
 }
 
 void main()
@@ -205,11 +206,17 @@ void main()
       // At the first two interfaces neighbours take numbers far apart, so that each share of them does what it should.
       vec2 lattice = (i == 0) ? vec2(0.7548777, 0.5698403) : vec2(0.8191725, 0.6710436);
       float turn = fract(dot(floor(gl_FragCoord.xy), lattice) + media_random(choice));
-      bool mirrored = ((i < 2) ? turn : media_random(seed)) < reflectance;
-      apart *= inversesqrt(max(mirrored ? reflectance : 1.0 - reflectance, 1e-4));
+      // What is mirrored there goes to all sides, so that more rays than its share of light are: few would show as streaks,
+      // and are as wide as if they were no more, so that they overlap.
+      float share = (i < 2) ? max(reflectance, MIRRORED_SHARE) : reflectance;
+      bool mirrored = ((i < 2) ? turn : media_random(seed)) < share;
+      flux *= mirrored ? reflectance / share : (1.0 - reflectance) / max(1.0 - share, 1e-6);
+      apart *= inversesqrt(max(mirrored ? reflectance : 1.0 - share, 1e-4));
       if (mirrored) {
         float half_width = (width + spread * travelled) * apart;
-        growth += leaves ? 0.0 : half_width * mirrored_spread(hit, position, smooth_normal, direction, half_width);
+        // What glass mirrors inside goes through a focus and spreads behind it, by less as it is bent before and after.
+        float spreads = mirrored_spread(hit, position, smooth_normal, direction, half_width);
+        growth += half_width * (leaves ? 0.5 * abs(spreads) : max(spreads, 0.0));
         direction = safe_normalize(direction + 2.0 * cosine * smooth_normal);
       }
       else {
@@ -224,7 +231,7 @@ void main()
     else if (kind.x > 1.5) {  // a mirror
       flux *= glass.rgb;
       float half_width = (width + spread * travelled) * apart;
-      growth += half_width * mirrored_spread(hit, position, smooth_normal, direction, half_width);
+      growth += half_width * max(mirrored_spread(hit, position, smooth_normal, direction, half_width), 0.0);
       direction = safe_normalize(direction - 2.0 * dot(direction, smooth_normal) * smooth_normal);
       position = ray_origin(position, facing);
     }
