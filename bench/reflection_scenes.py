@@ -204,7 +204,7 @@ def _white():
 
 
 PATHS = {"patterned floor": ("diffuse indirect",), "picture off screen": ("diffuse indirect",)}  # of the others: all
-BOUNCES = {"two mirrors": 8}  # that Cycles' glossy rays may have, as many as Candela shades
+BOUNCES = {"two mirrors": 8, "facing mirrors": 8}  # that Cycles' glossy rays may have, as many as Candela shades
 SCENES: dict[str, Callable[[], None]] = {
     "corridor": corridor,
     "roughness map": roughness_map,
@@ -221,7 +221,9 @@ SCENES: dict[str, Callable[[], None]] = {
 def make(name: str) -> bpy.types.Scene:
     """The scene of this name in an empty file; what it is measured by and Cycles' bounces stand in its properties."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    SCENES[name]()
+    from .glass_scenes import SCENES as GLASS
+
+    (SCENES | GLASS)[name]()
     scene = bpy.context.scene
     if name in PATHS:
         scene["paths"] = ",".join(PATHS[name])

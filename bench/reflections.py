@@ -24,7 +24,10 @@ from . import ages, markdown
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
-SIZE = (96, 64)
+FEW_COMMAND = "python -m bench reflections --few --page"
+FEW_HEAD = ["scene", "1 sample", "4", "16", "mean, 16", "isolated bright", "its seconds, 1, 4, 16", "Cycles 16 denoised",
+            "its seconds", "least error in its time"]  # fmt: skip
+SIZE, SMALL = (96, 64), (64, 48)
 PATHS = ("glossy", "transmission")  # that a scene is measured by, unless it names others
 
 
@@ -51,11 +54,13 @@ ENTRANTS = (
     Entrant("Cycles, 16", "CYCLES", 16),
     Entrant("Cycles, 16, denoised", "CYCLES", 16, denoised=True),
 )
+FEW = tuple(one for one in ENTRANTS if one.label in ("Candela, 1", "Candela, 4", "Candela, 16", "Cycles, 16, denoised"))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", help="names of scenes")
     parser.add_argument("--reference", type=int, default=1024, help="samples of each of Cycles' two references")
+    parser.add_argument("--few", action="store_true", help="pictures of few samples at equal time, one row a scene")
     parser.add_argument("--page", action="store_true", help="write docs/reflections.md's tables")
     parser.add_argument("--pictures", type=Path, help="folder for PNG files")
 
@@ -72,15 +77,54 @@ class Result:
 def command(options: argparse.Namespace) -> int:
     import addon
 
-    from . import reflection_scenes
+    from . import glass_scenes, reflection_scenes
 
     addon.register()
-    for name in options.only or list(reflection_scenes.SCENES):
+    if options.few:
+        return _few(options)
+    order = [*reflection_scenes.SCENES, *glass_scenes.SCENES]
+    for name in options.only or order:
         noise, results = _measure(reflection_scenes.make(name), name, options)
         table, row = _table(noise, results), _summary(name, results)
         print(f"### {name}", table, markdown.table([SUMMARY_HEAD, row]), sep="\n\n", flush=True)
         if options.page:
-            _put(name, row, table, list(reflection_scenes.SCENES))
+            _put(name, row, table, order)
+    return 0
+
+
+def _few(options: argparse.Namespace) -> int:
+    """A row for each scene, at SMALL pixels: errors of whole pictures, means, isolated bright pixels and processor
+    seconds, beside Cycles of 16 samples, denoised. `--page`: rows of scenes that were not asked for stay."""
+    from . import bright, glass_scenes, reflection_scenes
+
+    order = [*glass_scenes.SCENES, *reflection_scenes.SCENES]
+    text = PAGE.read_text(encoding="utf-8").partition(markdown.begin(FEW_COMMAND))[2].partition(markdown.END)[0]
+    rows = {cells[0]: cells for cells in map(_cells, text.splitlines()) if cells and cells[0] in order}
+    for name in options.only or order:
+        scene = reflection_scenes.make(name)
+        references = [_render(scene, Entrant("", "CYCLES", options.reference), seed, SMALL)[0] for seed in (0, 1)]
+        first, second = (one["picture"] for one in references)
+        truth, noise = (first + second) / 2, error(first, second) / 4
+        _keep(options.pictures, name, "truth", truth)
+        _render(scene, FEW[0], 3, SMALL)  # what compiles is not timed
+        found = {one: _render(scene, one, 7, SMALL) for one in FEW}
+        errors = {one: max(error(images["picture"], truth) - noise, 0.0) for one, (images, _) in found.items()}
+        for one, (images, _) in found.items():
+            _keep(options.pictures, name, one.label, images["picture"])
+        *ours, cycles = FEW
+        picture, limit = found[ours[-1]][0]["picture"], found[cycles][1]
+        light = bright.luminance(picture)
+        alone = bright.isolated(light) & bright.brighter(light, bright.around(bright.luminance(truth), whole=True))
+        least = min(((errors[one], one.samples) for one in ours if found[one][1] <= limit), default=None)
+        rows[name] = [
+            name, *(f"{errors[one]:.4f}" for one in ours), f"{picture.mean() / truth.mean():.3f}", str(int(alone.sum())),
+            ", ".join(f"{found[one][1]:.1f}" for one in ours), f"{errors[cycles]:.4f}", f"{limit:.1f}",
+            "none as fast" if least is None else "{:.4f} ({})".format(*least),
+        ]  # fmt: skip
+        print("  ".join(rows[name]), flush=True)
+        if options.page:
+            shown = [rows[one] for one in order if one in rows]
+            markdown.put_between(PAGE, FEW_COMMAND, markdown.table([FEW_HEAD, *shown]))
     return 0
 
 
@@ -181,8 +225,8 @@ def error(found: np.ndarray, truth: np.ndarray) -> float:
     return float(relative_squared_error(found.astype(np.float64), truth.astype(np.float64)).mean())
 
 
-def _render(scene, entrant: Entrant, seed: int) -> tuple[dict[str, np.ndarray], float]:
-    """The picture and what its paths bring, (H, W, 3), and seconds of the render."""
+def _render(scene, entrant: Entrant, seed: int, size: tuple[int, int] = SIZE) -> tuple[dict[str, np.ndarray], float]:
+    """The picture and what its paths bring, (H, W, 3), and seconds of the render: of SMALL ones of the processors."""
     from addon.compare.reference import render_passes
 
     settings = scene.candela
@@ -193,9 +237,10 @@ def _render(scene, entrant: Entrant, seed: int) -> tuple[dict[str, np.ndarray], 
     extra = [(scene.cycles, "use_denoising", True)] if entrant.denoised else []
     if "glossy_bounces" in scene:
         extra.append((scene.cycles, "glossy_bounces", scene["glossy_bounces"]))
-    start = time.perf_counter()
-    images = render_passes(scene, entrant.engine, entrant.samples, seed, size=SIZE, extra=extra).images
-    seconds = time.perf_counter() - start
+    clock = time.process_time if size == SMALL else time.perf_counter
+    start = clock()
+    images = render_passes(scene, entrant.engine, entrant.samples, seed, size=size, extra=extra).images
+    seconds = clock() - start
     found = {"picture": images["combined"][..., :3]}
     for path in str(scene.get("paths", ",".join(PATHS))).split(","):
         kind, _, order = path.partition(" ")

@@ -15,6 +15,7 @@ from ..sources import lights
 
 LONG = 8.0  # squared longest side by area, from which on a triangle is halved; half a square has 4
 LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
+MOST_OWN, NEAR_TILES = 1024, 0.1  # triangles that pixels search; share of what is lit that is near
 MOST_ASKED = 512  # triangles whose distance from what is lit is measured
 TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
@@ -91,6 +92,33 @@ class EmissiveTriangles:
         density = (weight * weight / np.maximum(double_area / 2, 1e-30)).sum()
         self.reach = float(np.sqrt(self.power**2 / max(float(density), 1e-300) / 2)) if self.power > 0 else 0.0
         self._edges = np.concatenate([[0.0], np.cumsum(weight)])
+        self._receivers = frame.receivers
+
+    @property
+    def near(self) -> bool:
+        """Whether a tenth of what is lit is so near that points of all would be seen apart, and all triangles light
+        the same."""
+        boxes = self._receivers
+        if not self.power > 0 or len(self.radiance) > MOST_OWN or boxes is None or not len(boxes.distance):
+            return False
+        step = -(-len(boxes.distance) // 64)
+        low, high = boxes.low[::step, None], boxes.high[::step, None]
+        places = self.corners.mean(axis=1)
+        gaps = np.maximum(np.maximum(low - places, places - high), 0.0)
+        nearest = np.sqrt((gaps**2).sum(axis=2)).min(axis=1)
+        alike = not any(self.unlit) and not any(self.passing) and (self.flags == self.flags[0]).all()
+        return bool(alike and np.quantile(nearest, NEAR_TILES) < 0.75 * self.reach)
+
+    def texels(self) -> np.ndarray:
+        """(4 N, 4): what shaders/light/mesh_rays.glsl reads."""
+        found = np.zeros((len(self.radiance), 4, 4))
+        found[:, 0, :3], found[:, 0, 3] = self.corners[:, 0], self._edges[:-1] / self.power
+        found[:, 1:3, :3] = self.corners[:, 1:] - self.corners[:, :1]
+        across = np.cross(found[:, 1, :3], found[:, 2, :3])
+        found[:, 1, 3] = self.sided
+        found[:, 2, 3] = np.where((across * self.normal).sum(axis=1) < 0, -1.0, 1.0)
+        found[:, 3, :3] = self.radiance
+        return found.reshape(-1, 4)
 
     def row(
         self, numbers: tuple[float, float, float], share: float, flags: int, views: int = 1, samples: float = np.inf,

@@ -13,6 +13,9 @@ As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissiv
 | maps | `points` x (1 view, or up to 6 cube faces), or a ray per pixel for each where that costs less |
 | passes | 1 over the screen |
 
+Where a tenth of what is lit stands nearer than the meshes are large, points that all pixels share would be seen as
+blotches: there each pixel draws eight of its own for a ray, and keeps one by what it brings (light/mesh_rays.glsl).
+
 Emission that varies is measured place by place (scene/emission_maps.py).
 
 Fails: very many small emitters need many samples.
@@ -28,27 +31,44 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
+from ..gfx import images
 from ..lighting import depth_maps
 from ..lighting.caustic_casters import meshes_answered
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import DIRECT_WRITES, light_surfaces
 from ..lighting.visibility import (
+    NO_VIEWS,
+    RAY_CONSTANTS,
     RESOLUTION,
     LightPoint,
+    Lookup,
+    Maps,
     PlainMaps,
     Rays,
     ShadowLinks,
     VisibilityProvider,
     by_rays,
     map_resolution,
+    ray_bindings,
 )
 from ..materials.compiler import may_emit, may_reflect
+from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..surfaces.draw import LIT_SURFACES
 
 FEWEST_POINTS, MOST_POINTS = 32, 16  # in a whole picture, and in one of its samples
+
+
+MESH_RAYS = Lookup(
+    "mesh rays",
+    "light/mesh_rays.glsl",
+    textures=(*acceleration.HIERARCHY_TEXTURES, ("RGBA32F", "mesh_lights")),
+    constants=(*RAY_CONSTANTS, ("INT", "mesh_light_count"), ("FLOAT", "mesh_light_power")),
+    defines=(("OWN_POINTS", "1"), ("CANDIDATE_POINTS", "8")),
+    maps=False,
+)
 
 
 class EmissiveLight(Technique):
@@ -67,6 +87,7 @@ class EmissiveLight(Technique):
         self._maps, self._rays = PlainMaps(self._resolution), Rays()
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
+        self._near: images.Image | None = None  # its triangles, where each pixel has points of its own
         self._traced: bool | None = None  # whether rays take the place of maps; None: not decided yet
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -79,9 +100,11 @@ class EmissiveLight(Technique):
 
     def begin(self, frame: Frame) -> None:
         self._traced = None
+        self._near = None
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         self._triangles = EmissiveTriangles(frame, ("diffuse", "glossy"))
+        self._near = self._own_points(frame)
         frame.provide(EmissivePoints(self._triangles.power, float(self._count(frame.settings))))
 
     def sample(self, frame: Frame) -> Iterator[None]:
@@ -95,6 +118,14 @@ class EmissiveLight(Technique):
         flags = lights.SHADOW_FLAG + lights.TRACED_FLAG + lights.GLASS_BLOCKS_FLAG * blocked
         provider = frame.service(VisibilityProvider)
         patches = provider is not None and provider.serves_every_source(frame)
+        if self._near is not None:
+            row = self._triangles.row((0.5, 0.5, 0.5), count, flags, 1, 8.0 * frame.settings.samples)
+            points = [LightPoint(row, self._rays)] * count
+            yield from light_surfaces(
+                frame, self, points, 1 << lights.SURFACE, self._sources, lambda *_: self._own_rays(frame)
+            )
+            frame.count(self, "rays per pixel", count)
+            return
         points = []
         for k in range(count):
             number = frame.sample * count + k
@@ -117,6 +148,30 @@ class EmissiveLight(Technique):
             row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)
             points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
         yield from light_surfaces(frame, self, points, 1 << lights.SURFACE, self._sources)
+
+    def _own_points(self, frame: Frame) -> images.Image | None:
+        """The triangles, where pixels draw points of their own: near a mesh, points that all pixels share are seen as
+        blotches. None where they are shared."""
+        provider = frame.service(VisibilityProvider)
+        patches = provider is not None and provider.serves_every_source(frame)
+        # Maps ask the material of a layer itself; rays know it by cells.
+        layered = any(material.transparent for material in frame.materials.compiled)
+        if patches or layered or frame.settings.draft or not self._triangles.near or not frame.snapshot.casts_shadows:
+            return None
+        if frame.hierarchy("shadow") is None:
+            return None
+        frame.chose(self, "points", "of each pixel's own, because surfaces stand close to emissive meshes")
+        return images.upload_list(self._triangles.texels())
+
+    def _own_rays(self, frame: Frame) -> Maps:
+        textures, constants = ray_bindings(frame)
+        return Maps(
+            None, NO_VIEWS, MESH_RAYS, textures={**textures, "mesh_lights": self._near},
+            constants={
+                **constants, "mesh_light_count": len(self._triangles.radiance),
+                "mesh_light_power": self._triangles.power,
+            },
+        )  # fmt: skip
 
     def _resolution(self, frame: Frame) -> int:
         return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
@@ -143,12 +198,14 @@ class EmissiveLight(Technique):
     def _count(self, settings: Settings) -> int:
         """Points per sample: more where a picture of few samples would have few in all."""
         points = settings.get(self, "points")
+        if self._near is not None:  # a ray of each stands for several points
+            return max(points // 2, min(FEWEST_POINTS // 2 // settings.samples, MOST_POINTS // 4))
         return max(points, min(FEWEST_POINTS // settings.samples, MOST_POINTS)) if settings.whole else points
 
     def release(self) -> None:
         self._maps.release()
         self._sources.release()
-        self._triangles = None
+        self._triangles = self._near = None
 
 
 def _views(frame: Frame, point: np.ndarray, number: int, resolution: int) -> list[depth_maps.MapView]:

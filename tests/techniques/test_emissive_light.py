@@ -54,6 +54,18 @@ def test_an_emissive_square_gives_its_form_factor_however_it_is_cut(floor, cuts)
     assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
 
 
+@pytest.mark.parametrize("cuts", [1, 7])
+def test_close_to_a_mesh_few_samples_have_no_blotches(floor, cuts):
+    """A quarter of a metre below a panel of a metre: each pixel draws points of its own there."""
+    panel(floor, z=0.25, cuts=cuts)
+    source = model.area((0, 0, 0.25), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    expected = model.irradiance(source, receivers(1))
+    found = irradiance(floor, 16).ravel()
+    assert "of each pixel's own" in str(floor.ledger.row("emissive_light").choices)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
+    assert np.sqrt(np.mean((found / expected - 1) ** 2)) < 0.04
+
+
 @pytest.mark.slow
 def test_emission_leaves_both_sides(floor):
     panel(floor, turn=(0, np.pi, 0), location=(0, 0, 4))
