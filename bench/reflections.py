@@ -117,7 +117,8 @@ def _few(options: argparse.Namespace) -> int:
         alone = bright.isolated(light) & bright.brighter(light, bright.around(bright.luminance(truth), whole=True))
         least = min(((errors[one], one.samples) for one in ours if found[one][1] <= limit), default=None)
         rows[name] = [
-            name, *(f"{errors[one]:.4f}" for one in ours), f"{picture.mean() / truth.mean():.3f}", str(int(alone.sum())),
+            name, *(f"{errors[one]:.4f}" for one in ours),
+            f"{picture.mean() / truth.mean():.3f}", str(int(alone.sum())),
             ", ".join(f"{found[one][1]:.1f}" for one in ours), f"{errors[cycles]:.4f}", f"{limit:.1f}",
             "none as fast" if least is None else "{:.4f} ({})".format(*least),
         ]  # fmt: skip
