@@ -25,8 +25,10 @@ from . import ages, markdown
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
 FEW_COMMAND = "python -m bench reflections --few --page"
-FEW_HEAD = ["scene", "1 sample", "4", "16", "mean, 16", "isolated bright", "its seconds, 1, 4, 16", "Cycles 16 denoised",
-            "its seconds", "least error in its time"]  # fmt: skip
+FEW_HEAD = [
+    "scene", "1 sample", "4", "16", "mean, 16", "isolated bright", "its seconds, 1, 4, 16", "Cycles 16 denoised",
+    "its seconds", "least error in its time",
+]  # fmt: skip
 SIZE, SMALL = (96, 64), (64, 48)
 PATHS = ("glossy", "transmission")  # that a scene is measured by, unless it names others
 
