@@ -9,7 +9,7 @@ indirect light they send on what leaves on the side where it came from.
 |---|---|
 | rays | a point: `walks` times about 2 / (1 - albedo)^(1/2) + 2 |
 | passes | 2 |
-| bytes | 64 a point, up to 32 for each of 64^3 voxels an instance |
+| bytes | 80 a point, up to 32 for each of 64^3 voxels an instance |
 
 Bias: even over a point's cell; colours and radii are the means of their material; of indirect light what leaves on the
 other side is lost. Burley's method sends as a diffuse surface does: so it does in Cycles.
@@ -37,8 +37,8 @@ from .media import dimmed
 from .walked_light import FEW_WALKS
 
 LEAST_WALKS = 4  # of a point in a sample
-WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 4, images.LIST_WIDTH
-LEFT = ("sent", "slope", "part", "same")
+WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 5, images.LIST_WIDTH
+LEFT = ("sent", "slope", "part", "same", "lean")
 LEAVING = passes.fullscreen_program(
     "light that leaves points",
     "subsurface/leaving.frag.glsl",

@@ -3,10 +3,12 @@
 //
 //   sent  radiance, of the direct light of points, mean over directions
 //   slope by how much more the normal's direction gets than the surface's: the line fitted to the walks by the cosine
+//   lean  along the surface, the direction towards which more leaves, by how much of the mean: a vector for each channel
 //   part  share of the diffuse albedo that scatters and that walks find; the rest is as a diffuse surface
 //   same  of light that arrives evenly at the side on which the point lies, how much leaves there again
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
+#include "subsurface/lean.glsl"
 #include "subsurface/walks.glsl"
 #include "subsurface/walked.glsl"
 
@@ -39,6 +41,7 @@ void main()
   out_part = vec4(0.0);
   out_same = vec4(0.0);
   out_slope = vec4(0.0);
+  out_lean = vec4(vec3(pack_lean(vec3(0.0))), 0.0);
   vec4 place = point_position_fetch(texel);
   vec4 belongs = point_instances_fetch(texel);
   int material = int(belongs.w + 0.5);
@@ -71,6 +74,7 @@ void main()
   uvec3 roll = roll_of(texel, film_view.sample_index, film_view.seed, 239);
   vec3 rest = vec3(0.0);
   vec3 by_cosine = vec3(0.0);
+  mat3 aslant = mat3(0.0);
   for (int walk = 0; walk < walks; walk++) {
     Even even = even_of(texel, film_view.sample_index * walks + walk, 241);
     uvec2 salt = hash3(even.more).xy;
@@ -81,7 +85,10 @@ void main()
     if (dot(direction, face) < 0.0) {
       rest += walk_below(below, start, direction, even, roll);
     }
-    by_cosine += (dot(view, entered_normal) - 2.0 / 3.0) * (sent_so_far - before);
+    float cosine = dot(view, entered_normal);
+    vec3 brought = sent_so_far - before;
+    by_cosine += (cosine - 2.0 / 3.0) * brought;
+    aslant += outerProduct(view - cosine * entered_normal, brought);
   }
   rest *= walk_rest(color.rgb);
   vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / (max(color.rgb, vec3(1e-3)) * float(walks));
@@ -89,6 +96,9 @@ void main()
   // One over the variance of the cosine; its noise is larger than what it adds: a mean over the samples so far.
   vec3 slope = 18.0 * by_cosine * norm;
   out_slope = vec4((newest < 1.0) ? mix(slope_before_fetch(texel).rgb, slope, newest) : slope, 0.0);
+  // One over the variance of either component along the surface.
+  vec3 per = vec3(4.0) / max(sent_so_far, vec3(1e-12));
+  out_lean = vec4(pack_lean(per.x * aslant[0]), pack_lean(per.y * aslant[1]), pack_lean(per.z * aslant[2]), 0.0);
   out_part = vec4(part * share.rgb, 0.0);
   out_same = vec4(same_so_far * norm, 0.0);
 }

@@ -1,7 +1,9 @@
 // What light below their surfaces leaves objects where rays meet them, in place of what a diffuse surface would send: of the nearest
 // point of an object that scatters (lighting/leaving_light.py). `leaving_light` is a list, 2048 to a row: where instances begin,
 // how many there are, where voxels begin; from the next texel on which materials scatter, four to a texel; from the next row on
-// four texels a point (subsurface/leaving_list.frag.glsl); instances, two each; voxels, two each (scatter_points.py).
+// five texels a point (subsurface/leaving_list.frag.glsl); instances, two each; voxels, two each (scatter_points.py).
+#include "subsurface/lean.glsl"
+
 #define MEAN_COSINE_SENT (2.0 / 3.0)
 #define LEAVING_SPREAD 0.9  // voxels, over which what points send is spread
 
@@ -43,7 +45,7 @@ bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint
     int index = int(head.z) + int(voxels.w) + 2 * ((at.x * int(voxels.y) + at.y) * int(voxels.z) + at.z) + number / 3;
     int cell = int(leaving_texel(index)[number % 3] + 0.5) - 1;
     if (cell >= 0) {
-      vec3 path = leaving_texel(2048 + 4 * cell + 3).xyz - position;
+      vec3 path = leaving_texel(2048 + 5 * cell + 3).xyz - position;
       float away = length(path) / grid.w + 4.0 * abs(dot(path, normal)) / grid.w;
       if (away < least && length(path) < 5.0 * grid.w && (material >= 0 || abs(dot(path, normal)) < grid.w)) {
         least = away;
@@ -54,12 +56,15 @@ bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint
   if (chosen < 0) {
     return false;
   }
-  int first = 2048 + 4 * chosen;
+  int first = 2048 + 5 * chosen;
   vec4 mean = leaving_texel(first);
   vec4 parts = leaving_texel(first + 1);
   vec4 slope = leaving_texel(first + 2);
   part = parts.xyz;
-  sent = max(mean.xyz + slope.xyz * (dot(normal, to_viewer) - MEAN_COSINE_SENT), vec3(0.0));
+  vec3 lean = leaving_texel(first + 4).xyz;
+  vec3 aslant = vec3(dot(unpack_lean(lean.x), to_viewer), dot(unpack_lean(lean.y), to_viewer), dot(unpack_lean(lean.z), to_viewer));
+  aslant = max(vec3(1.0) + aslant, vec3(0.0));
+  sent = max(mean.xyz * aslant + slope.xyz * (dot(normal, to_viewer) - MEAN_COSINE_SENT), vec3(0.0));
   same = vec3(mean.w, parts.w, slope.w);
   return max_component(part) > 0.0;
 }
