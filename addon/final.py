@@ -32,6 +32,14 @@ from .ui.passes import CAMERA_AXES, CATCHER, GLARE, RenderPass
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 TAIL = 0.5  # the same, about
 FEW_SAMPLES, MANY_SAMPLES = 4, 12
+# What techniques take of a sample, about, in five sample scenes at 256x192 (`python -m bench left` shows what is told).
+USUAL_WORK = {
+    "instant_radiosity": 6.0, "multires_radiosity": 6.0, "micro_rendering": 6.0, "screen_space_photons": 3.0,
+    "environment_light": 1.5, "shaded_reflections": 1.5, "direct_light": 1.2, "airlight": 3.0, "traced_refraction": 1.5,
+    "image_space_subsurface": 1.5, "emissive_light": 1.0, "surfaces": 0.3,
+}  # fmt: skip
+LITTLE_WORK = 0.1
+TELLING_PART = 0.3  # of the first sample, from which on it tells what one takes
 TELL_S = 0.5  # between two sentences about one sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
 SHOW_SHARE = 0.04  # of the render's time, at most, that is spent on showing it
@@ -46,6 +54,7 @@ class Progress:
     text: str
     share: float | None = None
     picture: np.ndarray | None = None  # (H, W, 4) float32: the mean of the samples so far
+    left: float | None = None  # seconds until the end, about, as the text says
 
 
 @dataclass
@@ -229,8 +238,9 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
         if frame.samples_done == shown:
             news = inside.news(time.perf_counter()) if order.shows else None
             if news is not None:
-                left = left_of(order, share.left * wanted - shown, pace.each)
-                news = Progress(sentence(shown, wanted, left, news[0]), (share.number + news[1]) / share.of)
+                left = left_of(order, share.left * wanted - inside.done, pace.each or inside.each)
+                told = sentence(shown, wanted, left, news)
+                news = Progress(told, (share.number + inside.done / wanted) / share.of, left=left)
             yield news
             continue
         shown = frame.samples_done
@@ -245,8 +255,8 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
             showing += took
             next_picture = now + took + max(SHOW_S, took / SHOW_SHARE)
         pace.learn(shown - before, time.perf_counter())
-        left = left_of(order, share.left * wanted - shown, pace.each) if order.shows else None
-        yield Progress(sentence(shown, wanted, left), (share.number + shown / wanted) / share.of, picture)
+        left = left_of(order, share.left * wanted - shown, pace.each or inside.each) if order.shows else None
+        yield Progress(sentence(shown, wanted, left), (share.number + shown / wanted) / share.of, picture, left)
         if meter is not None and shown < wanted:
             with turn:
                 if meter.look(frame):
@@ -288,26 +298,44 @@ class SamplePace:
 
 
 class Inside:
-    """What is being done within a sample, and how much of the picture's samples is done with it, about."""
+    """What is being done within a sample, and how much of it is done, about: by what techniques take in usual scenes,
+    and by the rows of the pass that is drawn."""
 
     def __init__(self, frame: Frame, wanted: int, now: float):
         self._frame, self._wanted, self._told_at = frame, wanted, now
-        self._compiled = library.compile_count
+        self._compiled, self._begun = library.compile_count, (now, library.compile_seconds, frame.samples_done)
+        self._number, self._part = frame.samples_done, 0.0
+        weights = [USUAL_WORK.get(technique.name, LITTLE_WORK) for technique in frame.plan.techniques]
+        labels = [technique.label for technique in frame.plan.techniques]
+        self._work = {label: (sum(weights[:k]), weights[k]) for k, label in enumerate(labels)}
+        self._whole = sum(weights)
+        self.each: float | None = None  # seconds of a sample by what the first has taken so far; None: not yet known
 
-    def news(self, now: float) -> tuple[str, float] | None:
-        """The sentence and the share, now and then."""
-        if now - self._told_at < TELL_S or not self._frame.at:
+    @property
+    def done(self) -> float:
+        """Samples that are done, with the part of the one that is drawn."""
+        return self._frame.samples_done + self._part * (self._frame.samples_done == self._number)
+
+    def news(self, now: float) -> str | None:
+        """What is being done, now and then."""
+        frame = self._frame
+        if now - self._told_at < TELL_S or not frame.at:
             return None
         compiles, self._told_at = library.compile_count > self._compiled, now
         self._compiled = library.compile_count
-        labels = [technique.label for technique in self._frame.plan.techniques]
-        at = self._frame.at
-        part = labels.index(at) / len(labels) if at in labels else 0.0
-        text = f"compiling shaders for {at}" if compiles else at
-        return text, (self._frame.samples_done + part) / self._wanted
+        before, own = self._work.get(frame.at, (0.0, 0.0))
+        rows = frame.shared_out.part if frame.shared_out is not None else 0.0
+        part = (before + own * rows) / self._whole
+        self._part = max(part, self._part if self._number == frame.samples_done else 0.0)
+        self._number = frame.samples_done
+        started, compiled, first = self._begun
+        if self.done - first >= TELLING_PART:
+            worked = now - started - (library.compile_seconds - compiled)
+            self.each = max(worked, 0.0) / (self.done - first)
+        return f"compiling shaders for {frame.at}" if compiles else frame.at
 
 
-def left_of(order: Order, samples: int, each: float | None) -> float | None:
+def left_of(order: Order, samples: float, each: float | None) -> float | None:
     """Seconds that are left, by what a sample takes and by the time limit; None before the first sample."""
     if each is None:
         return None

@@ -29,6 +29,7 @@ from bench import (
     hashes,
     implicit_visibility,
     indirect,
+    left,
     media,
     memory,
     micro_rendering,
@@ -50,6 +51,7 @@ from bench import (
     subsurface_costs,
     textures,
     trees,
+    window,
 )
 
 VERBS = {
@@ -61,6 +63,7 @@ VERBS = {
     "growth": growth,
     "direct": direct,
     "indirect": indirect,
+    "left": left,
     "implicit_visibility": implicit_visibility,
     "media": media,
     "memory": memory,
@@ -86,6 +89,7 @@ VERBS = {
     "subsurface": subsurface,
     "textures": textures,
     "trees": trees,
+    "window": window,
     "subsurface_costs": subsurface_costs,
     "page": page,
     "points_motion": points_motion,

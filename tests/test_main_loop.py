@@ -120,11 +120,19 @@ def test_time_that_is_left_forgets_the_first_sample_once_there_is_another():
     assert 7 * pace.each == 14.0
 
 
-def test_a_render_says_what_it_does_within_a_sample():
-    technique = namedtuple("Technique", "label")
-    plan = type("Plan", (), {"techniques": [technique("Surfaces"), technique("Direct light")]})
-    frame = type("Frame", (), {"at": "Direct light", "plan": plan, "samples_done": 2})
+def test_a_render_says_what_it_does_within_a_sample_and_how_long_it_takes():
+    """Of two techniques that take as long the first is done, and half of the second: 3 s for 3/4 of a sample."""
+    technique = namedtuple("Technique", "label name")
+    plan = type("Plan", (), {"techniques": [technique("One", "one"), technique("Other", "other")]})
+    bands = type("Bands", (), {"part": 0.5})
+    frame = type("Frame", (), {"at": "Other", "plan": plan, "samples_done": 0, "shared_out": bands})
     inside = final.Inside(frame, 4, 100.0)
-    assert inside.news(100.1) is None
-    assert inside.news(101.0) == ("Direct light", 0.625)
+    assert inside.news(100.1) is None and inside.each is None
+    assert inside.news(103.0) == "Other"
+    assert inside.done == pytest.approx(0.75) and inside.each == pytest.approx(4.0)
+    bands.part = 0.1  # a second pass of the same technique
+    inside.news(104.0)
+    assert inside.done == pytest.approx(0.75)
+    frame.samples_done = 1
+    assert inside.done == 1.0
     assert final.sentence(2, 4, 7.0, "Direct light") == "Rendering 2 / 4 samples, 0:07 left, Direct light"

@@ -26,16 +26,17 @@ class Bands:
     def __init__(self):
         self._rows: dict[str, int] = {}
         self._drawing = ("", 0)  # technique and rows of the band that is being drawn
+        self.part = 0.0  # of the pass that is drawn in bands, how much is done
 
     def split(self, name: str, height: int) -> Iterator[tuple[int, int]]:
         """Rows (from, to) that technique `name` draws one after the other, up to `height`."""
         row = 0
         while row < height:
             end = min(row + self._rows.get(name, FIRST), height)
-            self._drawing = name, end - row
+            self._drawing, self.part = (name, end - row), row / height
             yield row, end
             row = end
-        self._drawing = "", 0
+        self._drawing, self.part = ("", 0), 0.0
 
     def learn(self, seconds: float, wanted: float) -> None:
         """The part of a sample that was drawn last took `seconds`, and should have taken `wanted`."""

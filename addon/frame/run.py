@@ -46,6 +46,7 @@ class Renderer:
         self.materials = MaterialSet()
         self.displacement = Displacement()
         self.frame: Frame | None = None
+        self.waits: Callable[[Snapshot, Settings], int | None] = _for_nothing
         self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
         self._glow = EmissionMaps()
@@ -76,7 +77,8 @@ class Renderer:
         self, snapshot: Snapshot, settings: Settings, numbers: tuple[int, ...] | None = None
     ) -> Generator[tuple[int, int], None, Frame]:
         """The same in parts: yields (0, 0) when geometry and materials are those of the snapshot, then (done, total)
-        after each program that had to be compiled; returns the frame."""
+        after each program that had to be compiled; returns the frame. While `waits` tells a number of programs that
+        somebody else compiles, it goes no further and yields (0, that number)."""
         try:
             frame = yield from self._begin(snapshot, settings)
             frame.numbers = numbers
@@ -90,7 +92,7 @@ class Renderer:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
         if settings.samples_to_draw < 1:
             raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
-        watch = Stopwatch()
+        watch, given = Stopwatch(), snapshot
         context.ensure()
         context.begin_picture()
         device_probe.ensure(measures=False)
@@ -102,6 +104,8 @@ class Renderer:
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
         yield 0, 0
+        while (left := self.waits(given, settings)) is not None:
+            yield 0, left
         device_probe.ensure()
         environment = self._update_environment(snapshot)
         self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
@@ -426,6 +430,10 @@ class Renderer:
         for write in frame.writes:
             if (write.accumulates or write.ranked) and write.name in frame.images:
                 frame.empty(write)
+
+
+def _for_nothing(_snapshot: Snapshot, _settings: Settings) -> None:
+    """As `Renderer.waits`: begin at once."""
 
 
 def _stage(frame: Frame, stage: str) -> Iterator[None]:

@@ -140,7 +140,7 @@ def _group_panels(group: Group) -> list[type]:
 
 def _shows_expert(context) -> bool:
     """What the extension's preferences say; everything where Candela is no extension."""
-    own = getattr(context.preferences, "addons", {}).get(__package__.rpartition(".")[0])
+    own = getattr(context.preferences, "addons", {}).get(__package__.removesuffix(".ui").removesuffix(".addon"))
     return own is None or getattr(own.preferences, "show_expert", True)
 
 

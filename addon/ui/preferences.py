@@ -28,16 +28,24 @@ class CANDELA_OT_measure_device(bpy.types.Operator):
 
 
 class CandelaPreferences(bpy.types.AddonPreferences):
-    bl_idname = __package__.rpartition(".")[0]  # the extension's own name
+    bl_idname = __package__.removesuffix(".ui").removesuffix(".addon")  # the extension's own name
 
     show_expert: bpy.props.BoolProperty(
         name="Show Expert Settings",
         description="Show parameters of techniques that trade one error for another, in the parts Advanced",
     )
 
+    compiles_ahead: bpy.props.BoolProperty(
+        name="Compile Shaders in a Second Process",
+        description="Let a second Blender without a window compile what a viewport needs, so that this one goes on "
+        "answering. It takes memory for a second copy of the scene, and ends two minutes after the last shader",
+        default=True,
+    )
+
     def draw(self, _context):
         column = self.layout.column()
         column.prop(self, "show_expert")
+        column.prop(self, "compiles_ahead")
         for line in device_lines():
             column.label(text=line)
         self.layout.operator(CANDELA_OT_measure_device.bl_idname, icon="FILE_REFRESH")

@@ -14,6 +14,8 @@ the instance's end itself, which may come where no GPU context is, but by a time
 
 from __future__ import annotations
 
+import os
+import time
 import traceback
 
 import bpy
@@ -29,6 +31,7 @@ from ..snapshot.errors import unforeseen
 from ..snapshot.scene import Camera, Snapshot
 from ..ui.properties import settings_of
 from ..ui.viewport_pass import shown_pass
+from .ahead import VARIABLE, Ahead
 from .pace import SCALES, STEP_S, STEP_SHARE, Pace, coarsest_for
 from .picture import BUDGET_S, MOST_BUDGET_S, REST_S, Viewport
 
@@ -48,10 +51,15 @@ __all__ = [
 
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
 
+LOOK_AGAIN_S = 0.1  # for programs that another process compiles
+SAY_S = 1.0  # between two redraws that tell how many
+EXTENSION = __package__.removesuffix(".viewport").removesuffix(".addon")
+
 TURN_WAIT_S = 0.1  # for the GPU, while a final render draws a part of a sample
 
 # -------------------------------------------------------------------------------------------------- Blender's callbacks
 
+_ahead = Ahead()
 _viewports: dict[tuple[int, int], Viewport] = {}  # by address of the region and session_uid of the scene
 
 
@@ -60,6 +68,7 @@ def _viewport_of(engine, context, depsgraph) -> Viewport:
     viewport = _viewports.get(key)
     if viewport is None:
         viewport = _viewports[key] = Viewport()
+    viewport.ahead = _ahead if compiles_ahead() else None
     if viewport.owner() is not engine:
         viewport.attach(engine, _free_soon)
     return viewport
@@ -101,7 +110,9 @@ def draw(engine, context, depsgraph) -> None:
         _show(engine, scene, viewport, (region.width / size[0], region.height / size[1]))
     warning = viewport.warning()
     engine.update_stats("Candela", viewport.status() + (f" | Warning: {warning}" if warning else ""))
-    if not viewport.done:
+    if viewport.held:
+        _redraw_soon(viewport)
+    elif not viewport.done:
         engine.tag_redraw()
     elif viewport.news:
         viewport.news = False
@@ -219,6 +230,33 @@ def _show(engine, scene, viewport: Viewport, pixel: tuple[float, float]) -> None
     gpu.state.blend_set("NONE")
 
 
+def compiles_ahead() -> bool:
+    """Whether programs are compiled by a second Blender (ahead.py)."""
+    own = bpy.context.preferences.addons.get(EXTENSION)
+    return os.environ.get(VARIABLE) != "0" and getattr(own and own.preferences, "compiles_ahead", False)
+
+
+def _redraw_soon(viewport: Viewport) -> None:
+    """Draw again when the other process has compiled all that the picture waits for, and now and then meanwhile: what
+    the window's redraws take, the other process lacks."""
+    if viewport.looked_after:
+        return
+    viewport.looked_after, asked = True, time.monotonic()
+
+    def look() -> float | None:
+        engine = viewport.owner()
+        if engine is None or not viewport.held:
+            viewport.looked_after = False
+            return None
+        if not _ahead.came() and time.monotonic() - asked < SAY_S:
+            return LOOK_AGAIN_S
+        viewport.looked_after = False
+        engine.tag_redraw()
+        return None
+
+    bpy.app.timers.register(look, first_interval=LOOK_AGAIN_S)
+
+
 def _free_soon() -> None:
     if not bpy.app.timers.is_registered(_free_orphans):
         bpy.app.timers.register(_free_orphans, first_interval=FREE_AFTER_S)
@@ -245,5 +283,6 @@ def free_all() -> None:
     for viewport in _viewports.values():
         viewport.release()
     _viewports.clear()
+    _ahead.close()
     if bpy.app.timers.is_registered(_free_orphans):
         bpy.app.timers.unregister(_free_orphans)

@@ -21,12 +21,13 @@ from ..frame.settings import Settings
 from ..gfx import device, images, library, passes
 from ..scene.view import View
 from ..snapshot import SnapshotCache
-from ..snapshot.scene import Camera, Snapshot
+from ..snapshot.scene import Camera, Film, Snapshot
 from ..surfaces.first_look import FirstLook
 from ..techniques.film import check_tree
 from ..ui.notes import losses
 from ..ui.passes import RenderPass
 from . import one_pass
+from .ahead import Ahead
 from .pace import SCALES, STEP_S, GuidePace, Pace
 
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
@@ -60,6 +61,9 @@ class Viewport:
 
     def __init__(self):
         self.renderer = Renderer(techniques.make_registry)
+        self.ahead: Ahead | None = None  # who compiles programs elsewhere, before a picture is begun here
+        self.held = False  # the picture waits for that
+        self.looked_after = False  # a timer looks when that has come
         self.cache = SnapshotCache()
         self.pace = Pace()
         self.bands = Bands()
@@ -123,6 +127,8 @@ class Viewport:
             return self.error
         if self.paused and self.frame is not None:
             return f"Paused after sample {self.frame.samples_done} of {self.frame.settings.samples}"
+        if self.held and self.ahead is not None:
+            return self.ahead.doing
         if self._beginning is not None:
             left = self._beginning.left
             return f"Compiling shaders ({left} remaining)" if left else "Reading the scene"
@@ -354,20 +360,23 @@ class Viewport:
     ) -> None:
         check_tree(settings.passes)
         self._beginning = None
-        width, height = (max(-(-extent // scale), 1) for extent in size)
-        x, y = width / size[0], height / size[1]
-        scaled = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
         asked = frozenset(self.render_pass.images if self.render_pass is not None else ())
         film = replace(
-            self._snapshot.film, width=width, height=height, border=scaled, position="film.position" in asked
+            self._snapshot.film, width=size[0], height=size[1], border=border, position="film.position" in asked
         )
-        # A part is done when the GPU has done it; a draft of a moving view is drawn as one, whose passes need not wait
-        # for each other.
-        drawn = replace(settings, profile=scale == 1 or why == CLIMBS, shows=asked)
-        if scale > 1:
-            drawn = drawn.as_draft()
-        parts = self.renderer.beginning(replace(self._snapshot, camera=camera, film=film), drawn)
+        whole, settings = replace(self._snapshot, camera=camera, film=film), replace(settings, shows=asked)
+        self.held = False
+        if self.ahead is not None:
+            self.renderer.waits = lambda _, drawn: self._waits_for(whole, settings, drawn.draft)
+        drawn = drawn_with(settings, scale, scale == 1 or why == CLIMBS)
+        parts = self.renderer.beginning(replace(whole, film=coarser(film, scale)), drawn)
         self._beginning = Beginning(parts, camera, size, border, scale, why, settings.samples, reading)
+
+    def _waits_for(self, whole: Snapshot, settings: Settings, draft: bool) -> int | None:
+        """How many programs somebody else has to compile before the picture is begun; None: none."""
+        left = self.ahead.left(self.renderer, whole, settings, draft)
+        self.held = left is not None
+        return left
 
     def _begun(self, settings: Settings, clock, called: float, known: int) -> bool:
         """Go on with the frame that is begun, if there is one; whether there is time to draw it."""
@@ -385,6 +394,8 @@ class Viewport:
                 raise
             begun.seconds += clock() - before
             begun.placed, begun.left = True, total - done
+            if self.held:
+                return False
             if begun.why == CHECKS and total:  # no picture that stays as it is compiles anything
                 self._changed(begun, settings, clock)
             if not device.known():  # it is measured next, which takes a second: a first look comes before
@@ -428,6 +439,21 @@ class Viewport:
         self._drop_picture()
         self._drop_look()
         self.frame = self._sample = self._snapshot = None
+
+
+def coarser(film: Film, scale: int) -> Film:
+    """The same film in pixels of `scale` times the size; its border is that of whole ones."""
+    width, height = (max(-(-extent // scale), 1) for extent in (film.width, film.height))
+    x, y = width / film.width, height / film.height
+    x0, y0, x1, y1 = film.border
+    return replace(film, width=width, height=height, border=(floor(x0 * x), floor(y0 * y), ceil(x1 * x), ceil(y1 * y)))
+
+
+def drawn_with(settings: Settings, scale: int, waits: bool) -> Settings:
+    """The settings of a picture at a scale. `waits`: a part is done when the GPU has done it; a draft of a moving view
+    is drawn as one, whose passes need not wait for each other."""
+    drawn = replace(settings, profile=waits)
+    return drawn.as_draft() if scale > 1 else drawn
 
 
 def _view_key(camera: Camera) -> tuple:

@@ -1,0 +1,271 @@
+"""Programs compiled ahead of a viewport's picture, by a second Blender without a window.
+
+Blender's `gpu` module compiles where it is asked, and all of Blender waits; its own compile workers are not offered to
+Python. Drivers keep what they have compiled on disk, for all processes. So before a picture whose programs nobody is
+known to have compiled, the viewport waits, and shows what it has, while another process draws the same snapshot
+(`ahead_worker.py`): first as a draft, then in full. What is begun then finds its programs in the driver's cache, and
+takes a few hundredths of a second for each.
+
+Which pictures are known is remembered from session to session by digests of what decides about programs: node trees,
+kinds of lamps, features. Where the process cannot be started, ends, or says nothing for long, programs are compiled
+here, one for each redraw, as without it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+import tomllib
+from collections import deque
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import gpu
+
+from ..frame import device_probe
+from ..frame.run import Renderer
+from ..frame.settings import Settings
+from ..gfx import device
+from ..gfx.library import Program
+from ..gfx.user_folder import user_folder
+from ..materials.graph import Graph
+from ..scene.media import has_media
+from ..snapshot.scene import NO_LINKS, Snapshot
+
+VARIABLE = "CANDELA_AHEAD"  # 0: never by a second process
+BACKENDS = ("OPENGL", "VULKAN")  # whose drivers keep programs for other processes
+SILENT_S = 90.0  # after which the process is given up: the largest programs take a third of it on slow machines
+MOST_BYTES = 512 << 20  # of a scene that is handed over
+MOST_KNOWN = 4096
+WORKER = Path(__file__).with_name("ahead_worker.py")
+ADDON = __package__.rpartition(".")[0]  # this extension's modules; in the other process they stand below `addon`
+DRAFT, FULL = "draft", "full"
+
+
+@dataclass
+class Job:
+    """What the other process draws."""
+
+    number: int
+    needs: frozenset[str]
+    left: int = 1  # programs that it still has to compile, as far as known
+    at: str = ""  # the technique whose programs it compiles, where it meets them while it draws
+    compiled: int = 0
+    told_at: float = field(default_factory=time.monotonic)
+    done: set[str] = field(default_factory=set)  # of DRAFT, FULL
+
+
+class Ahead:
+    """The second process, which all viewports share."""
+
+    def __init__(self):
+        self.failed = False
+        self._process: subprocess.Popen | None = None
+        self._lines: deque[str] = deque()
+        self._job: Job | None = None
+        self._jobs = 0
+        self._came = False
+        self._known: set[str] | None = None
+
+    def left(self, renderer: Renderer, whole: Snapshot, settings: Settings, draft: bool) -> int | None:
+        """How many programs the other process has to compile before this picture is begun, at least 1; None: begin.
+        `whole`: the scene on a film in full resolution; `settings`: those of the picture in full."""
+        if self.failed or gpu.platform.backend_type_get() not in BACKENDS:
+            return None
+        stage = DRAFT if draft else FULL
+        needs = frozenset(_digest(one) for one in needs_of(renderer, whole, settings))
+        self._hear()
+        if {f"{one} {stage}" for one in needs} <= self._remembered():
+            return None
+        if self._job is None or self._job.needs != needs:
+            self._begin(needs, whole, settings)
+        elif stage in self._job.done:
+            return None
+        if self._job is not None and time.monotonic() - self._job.told_at > SILENT_S:
+            self._give_up()
+        return None if self.failed else max(self._job.left, 1)
+
+    def came(self) -> bool:
+        """Whether a stage has been drawn, or the other process has ended, since this was asked last."""
+        self._hear()
+        came, self._came = self._came or self.failed, False
+        return came
+
+    @property
+    def doing(self) -> str:
+        """What the other process does, for the text in a region's corner."""
+        job = self._job
+        if job is None or not job.compiled:
+            return "Compiling shaders"
+        if job.at:
+            return f"Compiling shaders for {job.at} ({job.compiled} so far)"
+        return f"Compiling shaders ({job.left} remaining)"
+
+    def _begin(self, needs: frozenset[str], whole: Snapshot, settings: Settings) -> None:
+        self._jobs += 1
+        self._job = Job(self._jobs, needs)
+        order = {"number": self._jobs, "snapshot": whole, "settings": settings}
+        buffers: list[pickle.PickleBuffer] = []
+        try:
+            texts = pickle.dumps(order, 5, buffer_callback=buffers.append)
+            views = [buffer.raw() for buffer in buffers]
+            if sum(view.nbytes for view in views) > MOST_BYTES:
+                self._job.done |= {DRAFT, FULL}
+                return
+            if self._process is None or self._process.poll() is not None:
+                self._start()
+        except (OSError, ValueError, TypeError, AttributeError, pickle.PicklingError) as error:
+            print(f"Candela compiles shaders in its own process: {error}", file=sys.stderr)
+            self._give_up()
+            return
+        process = self._process
+        threading.Thread(target=_send, args=(process, [memoryview(texts), *views]), daemon=True).start()
+
+    def _start(self) -> None:
+        """A Blender of the same kind, with the same backend."""
+        backend = gpu.platform.backend_type_get().lower()
+        if bpy.app.binary_path:
+            options = ("--background", "--factory-startup", "--gpu-backend", backend, "--python", str(WORKER))
+            command = [bpy.app.binary_path, *options]
+        else:  # Blender as a module of Python
+            command = [sys.executable, str(WORKER)]
+        # It measures this device for us where nobody has, and keeps the figures where they are looked for.
+        environment = {**os.environ, "CANDELA_CACHE": str(device_probe.folder()), "CANDELA_AHEAD_OF": ADDON}
+        self._lines.clear()
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
+        )
+        threading.Thread(target=_receive, args=(self._process, self._lines), daemon=True).start()
+
+    def _hear(self) -> None:
+        """Take note of what has come from the other process."""
+        while self._lines:
+            line, job = self._lines.popleft(), self._job
+            if line == "":
+                self._came = True
+                if job is not None and FULL not in job.done:
+                    self._give_up()
+                return
+            try:
+                told = json.loads(line)
+            except ValueError:
+                continue
+            if job is None or told.get("number") != job.number:
+                continue
+            job.told_at, job.left = time.monotonic(), int(told.get("left", job.left))
+            job.at, job.compiled = str(told.get("at", job.at)), int(told.get("compiled", job.compiled))
+            if told.get("done"):
+                self._came = True
+                job.done.add(told["done"])
+            if told.get("lasting"):
+                self._remember({f"{one} {told['done']}" for one in job.needs})
+
+    def _give_up(self) -> None:
+        self.failed = True
+        self.close()
+
+    def close(self) -> None:
+        """End the other process."""
+        process, self._process, self._job = self._process, None, None
+        if process is not None and process.poll() is None:
+            process.kill()
+
+    # ------------------------------------------------------------------------------------- from session to session
+
+    def _remembered(self) -> set[str]:
+        if self._known is None:
+            self._known = set()
+            with contextlib.suppress(OSError, ValueError):
+                kept = json.loads(_file().read_text(encoding="utf-8"))
+                self._known = set(kept.get(_driver(), ()))
+        return self._known
+
+    def _remember(self, more: set[str]) -> None:
+        known = self._remembered()
+        known |= more
+        with contextlib.suppress(OSError):
+            _file().parent.mkdir(parents=True, exist_ok=True)
+            beside = _file().with_suffix(f".{os.getpid()}")
+            beside.write_text(json.dumps({_driver(): sorted(known)[:MOST_KNOWN]}), encoding="utf-8")
+            beside.replace(_file())
+
+
+def _file() -> Path:
+    return user_folder("programs") / "compiled_ahead.json"
+
+
+def _driver() -> str:
+    """What compiled programs hold for: this version of the extension, Blender, and the driver."""
+    manifest = WORKER.parents[2] / "blender_manifest.toml"
+    version = tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
+    return f"{version}, {manifest.stat().st_mtime_ns}, {bpy.app.version_string}, {device.key()}"
+
+
+def _digest(one: object) -> str:
+    return hashlib.sha1(repr(one).encode(), usedforsecurity=False).hexdigest()[:16]
+
+
+def _send(process: subprocess.Popen, parts: list) -> None:
+    """Write each part after its length; what reads is there or ends, which `_receive` notices."""
+    with contextlib.suppress(OSError, ValueError):
+        process.stdin.write(len(parts).to_bytes(8, "little"))
+        for part in parts:
+            process.stdin.write(memoryview(part).nbytes.to_bytes(8, "little"))
+            process.stdin.write(part)
+        process.stdin.flush()
+
+
+def _receive(process: subprocess.Popen, lines: deque[str]) -> None:
+    for line in process.stdout:
+        lines.append(line.decode("utf-8", "replace").strip() or "{}")
+    lines.append("")  # it has ended
+
+
+def needs_of(renderer: Renderer, snapshot: Snapshot, settings: Settings) -> list[tuple]:
+    """What decides which programs a picture uses, but for whether it is a draft: its materials, one by one, and all
+    else together."""
+    compiled = renderer.materials.compiled
+    shown = {draw.material for draw in renderer.geometry.draws if not compiled[draw.material].bounds_alone}
+    materials = [_text_of(renderer.materials.surface_program(k)) for k in shown]
+    flags = ("transparent", "tinted", "added", "glows", "uneven", "uneven_emission", "casts_stochastically")
+    of_materials = {(*(bool(getattr(c, name)) for name in flags), c.scatter > 0.0, c.glass is None) for c in compiled}
+    shines = any(max(one.emission) > 0.0 for one in compiled)
+    lamps = {
+        (
+            one.kind,
+            one.shape,
+            one.radius > 0.0,
+            one.graph is None,
+            one.cast_shadow,
+            one.spread < 3.14,
+            one.links is NO_LINKS,
+        )
+        for one in snapshot.lights
+    }
+    world, camera, film = snapshot.world, snapshot.camera, snapshot.film
+    trees = sorted(_types_in(one.graph) for one in (world, *snapshot.lights) if one.graph is not None)
+    features = (
+        sorted(map(repr, of_materials)), shines, sorted(map(repr, lamps)), trees, world.image is None, any(world.color),
+        has_media(snapshot), camera.panorama is None, camera.aperture is None, camera.kind, film.transparent,
+        any(one.links is not NO_LINKS for one in snapshot.instances),
+        any(one.caustics_caster for one in snapshot.instances),
+        min(settings.bounces, 2), settings.passes, sorted(settings.slots.items()), settings.samples > 1,
+        sorted(settings.shows or ()),
+    )  # fmt: skip
+    return [*materials, features]
+
+
+def _types_in(graph: Graph) -> tuple[str, ...]:
+    return tuple(sorted(node.type for node in graph.nodes.values()))
+
+
+def _text_of(program: Program) -> tuple:
+    return program.name, program.vertex, program.fragment, program.defines, program.snippets

@@ -1,0 +1,114 @@
+"""What a viewport in a real window costs before anything is compiled: `python -m bench window --only cornell_box`.
+
+Each scene is opened in a Blender with a window ($REAL_BLENDER, as for `make test-window`), with empty caches of driver
+and Blender, and with the newest zip of build/ as the extension. Rendered is chosen; when the picture rests, a lamp, a
+material of glass, and a border are added, one after the other. Of each: seconds until the view shows anything, until it
+shows the scene's light, and until it rests, and the longest time in which Blender did not answer: seconds of the clock,
+and of all threads of this process, which say more where other work shares the processors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import subprocess
+import tempfile
+from pathlib import Path
+
+from bench import markdown
+from bench.beside import ROOT, scenes_of
+
+SCENES = ("cornell_box", "window_interior", "hdri_product", "soft_shadow_garden")
+STEPS = ("rendered", "lamp", "material", "border")
+HEAD = (
+    "scene",
+    "backend",
+    "step",
+    "first picture, s",
+    "its light, s",
+    "at rest, s",
+    "longest block, s",
+    "its draw, s",
+    "dearest block, s of processor",
+    "at",
+)
+SCRIPT = ROOT / "tests" / "window" / "cold.py"
+TIMEOUT_S = 1500
+
+
+def blender(environment: dict[str, str], log: Path, *arguments: object) -> None:
+    """Run the real Blender; RuntimeError with the end of what it printed if it fails."""
+    command = [*shlex.split(os.environ.get("REAL_BLENDER") or "blender"), *map(str, arguments)]
+    with log.open("w") as file:
+        done = subprocess.run(
+            command, check=False, cwd=ROOT, env={**os.environ, **environment}, stdin=subprocess.DEVNULL, stdout=file,
+            stderr=subprocess.STDOUT, timeout=TIMEOUT_S,
+        )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(f"Blender ended with {done.returncode}: {log.read_text(errors='replace')[-2000:]}")
+
+
+def measured(scene: Path, backend: str, steps: list[str], package: Path, folder: Path) -> dict:
+    """What the script noted, by step."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as caches:
+        empty = {
+            "MESA_SHADER_CACHE_DIR": f"{caches}/driver", "XDG_CACHE_HOME": f"{caches}/user",
+            "BLENDER_USER_RESOURCES": f"{caches}/blender",
+        }  # fmt: skip
+        for path in empty.values():
+            Path(path).mkdir()
+        install = ("--command", "extension", "install-file", "--repo", "user_default", "--enable", package)
+        blender(empty, folder / "install.log", *install)
+        shown = ("--gpu-backend", backend, "--window-geometry", "0", "0", "1280", "800", scene)
+        blender(empty, folder / "blender.log", *shown, "--python", SCRIPT, "--", *steps, folder)
+    return json.loads((folder / "result.json").read_text())
+
+
+def rows_of(scene: str, backend: str, found: dict) -> list[tuple[str, ...]]:
+    def told(seconds: float | None) -> str:
+        return "-" if seconds is None else f"{seconds:.1f}"
+
+    return [
+        (
+            scene, backend, step, told(one["first_s"]) if step == "rendered" else "", told(one["lit_s"]),
+            told(one["rest_s"]), f"{one['longest_s']:.2f}", f"{one['longest_draw_s']:.2f}",
+            f"{one.get('dearest_s', 0.0):.2f}", one["longest_at"],
+        )
+        for step, one in found.items()
+        if step in STEPS
+    ]  # fmt: skip
+
+
+# ------------------------------------------------------------------------------------------------------------- command
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--only", nargs="+", default=SCENES, metavar="NAME", help="scenes, as of `bench beside`")
+    parser.add_argument("--backend", nargs="+", default=["opengl"], choices=("opengl", "vulkan"))
+    parser.add_argument("--steps", nargs="+", default=list(STEPS), choices=STEPS)
+    parser.add_argument("--package", type=Path, help="the extension's zip; by default the newest of build/")
+    parser.add_argument("--output", type=Path, default=ROOT / "build" / "cold", help="for logs and pictures")
+
+
+def command(options: argparse.Namespace) -> int:
+    import addon
+    from addon.cli.terminal import quiet
+
+    addon.register()
+    package = options.package or max(ROOT.glob("build/candela-*.zip"), key=lambda path: path.stat().st_mtime)
+    rows = []
+    with quiet() as terminal:
+        for backend in options.backend:
+            for scene in scenes_of(list(options.only)):
+                folder = options.output / f"{scene.stem}-{backend}"
+                found = measured(scene, backend, list(options.steps), package, folder)
+                if "error" in found:
+                    print(scene.stem, backend, found["error"], file=terminal, flush=True)
+                for row in rows_of(scene.stem, backend, found):
+                    rows.append(row)
+                    print(*row, sep=" | ", file=terminal, flush=True)
+    print(markdown.table([HEAD, *rows]))
+    return 0

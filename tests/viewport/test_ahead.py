@@ -1,0 +1,117 @@
+"""Programs that a second process compiles, and what a viewport shows until they are there."""
+
+import subprocess
+import sys
+import time
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.gfx import images
+from addon.viewport import ahead
+from addon.viewport.ahead import DRAFT, FULL, Ahead, needs_of
+from tests.viewport.region import Region
+
+
+class Slow:
+    """Another process that has compiled nothing until it is told."""
+
+    doing = "Compiling shaders for Film (3 so far)"
+
+    def __init__(self):
+        self.ready, self.asked = set(), []
+
+    def left(self, renderer, whole, settings, draft):
+        self.asked.append((whole.film.width, whole.film.height, settings.draft))
+        return None if (DRAFT if draft else FULL) in self.ready else 5
+
+
+@pytest.fixture
+def own_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("CANDELA_CACHE", str(tmp_path))
+    return tmp_path
+
+
+def test_view_shows_a_first_look_then_a_draft_then_all_as_the_other_process_gets_ready(region):
+    region.viewport.ahead = slow = Slow()
+    region.draw()
+    assert region.viewport.held and region.viewport.looks and region.viewport.picture is not None
+    assert region.viewport.status() == slow.doing
+    region.draw(region.moved(0.1))  # the first look follows the view
+    assert region.viewport.held and region.viewport.looks and not region.viewport.done
+    slow.ready.add(DRAFT)
+    region.clock.now += 1.0
+    region.draw()
+    for _ in range(20):
+        region.clock.now += 1.0
+        region.draw()
+    assert not region.viewport.looks and region.viewport.scale > 1 and region.viewport.held
+    slow.ready.add(FULL)
+    held = region.rest()
+    assert slow.asked[-1][:2] == region.viewport.frame.size and not slow.asked[-1][2]
+    free = Region()
+    assert np.array_equal(held, free.rest())
+    free.viewport.release()
+
+
+def test_what_was_shown_stays_while_an_edit_waits(region):
+    before = region.rest()
+    region.viewport.ahead = Slow()
+    bpy.context.scene.objects["Point"].data.type = "SUN"
+    region.viewport.dirty = True
+    shown = images.read(region.draw())
+    assert region.viewport.held and not region.viewport.looks
+    assert np.array_equal(shown, before)
+
+
+def needs(region):
+    region.viewport.dirty = True
+    region.rest()
+    viewport = region.viewport
+    return set(map(repr, needs_of(viewport.renderer, viewport.frame.snapshot, viewport.frame.settings)))
+
+
+def test_what_needs_programs_is_told_from_what_does_not(region):
+    first = needs(region)
+    cube, lamp = bpy.context.scene.objects["Cube"], bpy.context.scene.objects["Point"]
+    cube.location.x += 0.5
+    lamp.data.energy *= 2.0
+    assert needs(region) == first
+    lamp.data.type = "SPOT"
+    assert needs(region) != first
+
+
+@pytest.mark.slow
+def test_another_process_draws_and_is_remembered(region, own_folder):
+    region.viewport.ahead = other = Ahead()
+    said, ended = set(), time.monotonic() + 300.0
+    region.draw()
+    assert region.viewport.held
+    while not region.viewport.done and time.monotonic() < ended:
+        time.sleep(0.05)
+        region.clock.now += 1.0
+        region.draw()
+        said.add(region.viewport.status().split(" ")[0])
+    other.close()
+    assert region.viewport.done and not other.failed and "Compiling" in said
+    assert (own_folder / "compiled_ahead.json").exists()
+    again = Region()
+    again.viewport.ahead = other = Ahead()
+    again.rest()  # nothing is waited for
+    assert other._process is None
+    again.viewport.release()
+
+
+def test_process_that_ends_is_done_without(region, own_folder, monkeypatch):
+    started = subprocess.Popen
+    nothing = (sys.executable, "-c", "")
+    monkeypatch.setattr(ahead.subprocess, "Popen", lambda command, **options: started(nothing, **options))
+    region.viewport.ahead = other = Ahead()
+    region.draw()
+    ended = time.monotonic() + 30.0
+    while region.viewport.held and time.monotonic() < ended:
+        time.sleep(0.02)
+        region.draw()
+    assert other.failed and not region.viewport.held
+    region.rest()

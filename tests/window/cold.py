@@ -1,0 +1,134 @@
+"""Runs inside a windowed Blender whose driver has compiled nothing: how long its viewport takes, and how long Blender
+does not answer, when Rendered is chosen, and after edits that need programs which are not there yet."""
+
+import sys
+import time
+from pathlib import Path
+
+import bpy
+from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from stage import ENGINE, FOLDER, candela, picture, result, run, viewport_area, viewports, window
+
+SAMPLES = 2
+TIMEOUT_S = 400.0  # of one step
+PAUSE_S = 0.02  # between two looks; more of them would take processors from what is measured
+
+
+class Watch:
+    """Blender's answers since it was made: a timer runs between its own redraws."""
+
+    def __init__(self):
+        self.started = self.before = time.monotonic()
+        self.worked, self.dearest = time.process_time(), 0.0
+        self.longest, self.longest_at, self.said = 0.0, "", set()
+        self.draws = []  # seconds of Candela's own part of redraws
+        self._draw = candela().draw
+        candela().draw = self._timed
+
+    def _timed(self, *arguments):
+        before = time.perf_counter()
+        try:
+            self._draw(*arguments)
+        finally:
+            self.draws.append(time.perf_counter() - before)
+
+    def look(self):
+        now, worked = time.monotonic(), time.process_time()
+        self.dearest, self.worked = max(self.dearest, worked - self.worked), worked
+        if now - self.before > self.longest:
+            self.longest, self.longest_at = now - self.before, viewports()[0].status() if viewports() else ""
+        self.before = now
+        if viewports():
+            self.said.add(viewports()[0].status().split(" (")[0].split(",")[0])
+
+    @property
+    def seconds(self):
+        return time.monotonic() - self.started
+
+    def end(self):
+        candela().draw = self._draw
+        return {
+            "longest_s": self.longest, "dearest_s": self.dearest, "longest_at": self.longest_at,
+            "longest_draw_s": max(self.draws, default=0.0),
+            "redraws": len(self.draws), "said": sorted(self.said),
+        }  # fmt: skip
+
+
+def until_rest(name, change):
+    """Make a change, and wait until the viewport rests; what is noted stands in the result under the name."""
+    watch = Watch()
+    watched = viewports()[0] if viewports() else None
+    old = watched.frame if watched else None
+    change()
+    watch.look()
+    first = lit = None
+    while watch.seconds < TIMEOUT_S:
+        yield PAUSE_S
+        watch.look()
+        if not viewports():
+            continue
+        one = viewports()[0]
+        if one.error:
+            raise RuntimeError(one.error)
+        if first is None and one.picture is not None:
+            first = watch.seconds
+        anew = one.frame is not None and one.frame is not old and one.frame.samples_done > 0
+        if lit is None and anew and one.picture is not None and not one.looks:
+            lit = watch.seconds
+            picture(f"{name}_lit.png")
+            watch.before, watch.worked = (
+                time.monotonic(),
+                time.process_time(),
+            )  # the picture of the window takes its time
+        if lit is not None and one.done and not one.dirty:
+            break
+    result[name] = {"first_s": first, "lit_s": lit, "rest_s": watch.seconds, **watch.end()}
+    picture(f"{name}.png")
+    yield 0.2
+
+
+def steps():
+    scene, space = window().scene, viewport_area().spaces.active
+    scene.render.engine = ENGINE
+    scene.candela.viewport_samples = SAMPLES
+    space.overlay.show_overlays = space.show_gizmo = False
+    space.region_3d.view_perspective = "CAMERA"
+    yield 1.0
+
+    def choose():
+        space.shading.type = "RENDERED"
+
+    def add_lamp():
+        lamp = bpy.data.lights.new("New spot", "SPOT")
+        lamp.energy, lamp.spot_size = 200.0, 1.0
+        placed = bpy.data.objects.new("New spot", lamp)
+        placed.matrix_world = scene.camera.matrix_world @ placed.matrix_world.Translation(Vector((0.3, 0.3, 0.0)))
+        scene.collection.objects.link(placed)
+
+    def add_material():
+        material = bpy.data.materials.new("New glass")
+        if not material.use_nodes:
+            material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        glass, output = tree.nodes.new("ShaderNodeBsdfGlass"), tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(glass.outputs[0], output.inputs["Surface"])
+        shown = next(one for one in scene.objects if one.type == "MESH" and one.visible_get() and one.material_slots)
+        shown.material_slots[0].material = material
+
+    def border():
+        scene.render.use_border = True
+        scene.render.border_min_x = scene.render.border_min_y = 0.25
+        scene.render.border_max_x = scene.render.border_max_y = 0.75
+
+    wanted = sys.argv[sys.argv.index("--") + 1 : -1] or ["rendered", "lamp", "material", "border"]
+    changes = {"rendered": choose, "lamp": add_lamp, "material": add_material, "border": border}
+    for name in wanted:
+        yield from until_rest(name, changes[name])
+    result["folder"] = str(FOLDER)
+
+
+run(steps)
