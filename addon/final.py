@@ -21,6 +21,7 @@ from .frame.light_paths import LIGHT_PATHS
 from .frame.picture import Frame
 from .frame.run import Renderer
 from .frame.settings import Settings
+from .frame.within_sample import WithinSample
 from .gfx import images, library
 from .gfx.context import turn
 from .snapshot.light_groups import parts_of
@@ -32,13 +33,6 @@ from .ui.passes import CAMERA_AXES, CATCHER, GLARE, RenderPass
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 TAIL = 0.5  # the same, about
 FEW_SAMPLES, MANY_SAMPLES = 4, 12
-# What techniques take of a sample, about, in five sample scenes at 256x192 (`python -m bench left` shows what is told).
-USUAL_WORK = {
-    "instant_radiosity": 6.0, "multires_radiosity": 6.0, "micro_rendering": 6.0, "screen_space_photons": 3.0,
-    "environment_light": 1.5, "shaded_reflections": 1.5, "direct_light": 1.2, "airlight": 3.0, "traced_refraction": 1.5,
-    "image_space_subsurface": 1.5, "emissive_light": 1.0, "surfaces": 0.3,
-}  # fmt: skip
-LITTLE_WORK = 0.1
 TELLING_PART = 0.3  # of the first sample, from which on it tells what one takes
 TELL_S = 0.5  # between two sentences about one sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
@@ -232,7 +226,7 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
         limit = passed + max(limit - passed, 0.0) / share.left
     wanted, first, before = frame.settings.samples_to_draw, time.perf_counter(), frame.samples_done
     shown, showing, next_picture = -1, 0.0, first + SHOW_S
-    pace, inside = SamplePace(first, wanted), Inside(frame, wanted, first)
+    pace, inside = SamplePace(first, wanted), Inside(frame, first)
     meter = NoiseMeter(frame.settings.noise_threshold) if frame.settings.noise_threshold else None
     for _ in order.parts(renderer, frame):
         if frame.samples_done == shown:
@@ -298,41 +292,30 @@ class SamplePace:
 
 
 class Inside:
-    """What is being done within a sample, and how much of it is done, about: by what techniques take in usual scenes,
-    and by the rows of the pass that is drawn."""
+    """What is being done within a sample, how much of it is done, and what the first tells of the others."""
 
-    def __init__(self, frame: Frame, wanted: int, now: float):
-        self._frame, self._wanted, self._told_at = frame, wanted, now
+    def __init__(self, frame: Frame, now: float):
+        self._frame, self._told_at, self._within = frame, now, WithinSample(frame)
         self._compiled, self._begun = library.compile_count, (now, library.compile_seconds, frame.samples_done)
-        self._number, self._part = frame.samples_done, 0.0
-        weights = [USUAL_WORK.get(technique.name, LITTLE_WORK) for technique in frame.plan.techniques]
-        labels = [technique.label for technique in frame.plan.techniques]
-        self._work = {label: (sum(weights[:k]), weights[k]) for k, label in enumerate(labels)}
-        self._whole = sum(weights)
         self.each: float | None = None  # seconds of a sample by what the first has taken so far; None: not yet known
 
     @property
     def done(self) -> float:
         """Samples that are done, with the part of the one that is drawn."""
-        return self._frame.samples_done + self._part * (self._frame.samples_done == self._number)
+        return self._within.done
 
     def news(self, now: float) -> str | None:
         """What is being done, now and then."""
-        frame = self._frame
-        if now - self._told_at < TELL_S or not frame.at:
+        if now - self._told_at < TELL_S or not self._frame.at:
             return None
         compiles, self._told_at = library.compile_count > self._compiled, now
         self._compiled = library.compile_count
-        before, own = self._work.get(frame.at, (0.0, 0.0))
-        rows = frame.shared_out.part if frame.shared_out is not None else 0.0
-        part = (before + own * rows) / self._whole
-        self._part = max(part, self._part if self._number == frame.samples_done else 0.0)
-        self._number = frame.samples_done
+        self._within.look()
         started, compiled, first = self._begun
         if self.done - first >= TELLING_PART:
             worked = now - started - (library.compile_seconds - compiled)
             self.each = max(worked, 0.0) / (self.done - first)
-        return f"compiling shaders for {frame.at}" if compiles else frame.at
+        return f"compiling shaders for {self._frame.at}" if compiles else self._frame.at
 
 
 def left_of(order: Order, samples: float, each: float | None) -> float | None:

@@ -126,7 +126,7 @@ def test_a_render_says_what_it_does_within_a_sample_and_how_long_it_takes():
     plan = type("Plan", (), {"techniques": [technique("One", "one"), technique("Other", "other")]})
     bands = type("Bands", (), {"part": 0.5})
     frame = type("Frame", (), {"at": "Other", "plan": plan, "samples_done": 0, "shared_out": bands})
-    inside = final.Inside(frame, 4, 100.0)
+    inside = final.Inside(frame, 100.0)
     assert inside.news(100.1) is None and inside.each is None
     assert inside.news(103.0) == "Other"
     assert inside.done == pytest.approx(0.75) and inside.each == pytest.approx(4.0)

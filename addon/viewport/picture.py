@@ -18,6 +18,7 @@ from ..frame.bands import Bands
 from ..frame.picture import Frame
 from ..frame.run import Renderer
 from ..frame.settings import Settings
+from ..frame.within_sample import WithinSample
 from ..gfx import device, images, library, passes
 from ..scene.view import View
 from ..snapshot import SnapshotCache
@@ -102,6 +103,7 @@ class Viewport:
         self._pauses = (0.0, 0.0)  # between the last redraws
         self._left_at: float | None = None  # when the last redraw ended, if it left something to be done
         self._news = -1  # of the library, when the sample was begun
+        self._within: WithinSample | None = None
         self._compiled = 0  # programs since the last whole sample
 
     @property
@@ -139,7 +141,9 @@ class Viewport:
         if done == 0 and self._compiled:
             return f"Compiling shaders for {self.frame.at} ({self._compiled} so far){coarse}"
         at = f", {self.frame.at}" if done < of and self.frame.at else ""
-        return f"Sample {done} of {of}, {self.seconds:.1f} s{coarse}{at}"
+        inside = round(100 * (self._within.done - done)) if self._within is not None and at else 0
+        part = f" ({inside} % of the next)" if self.scale == 1 and inside else ""
+        return f"Sample {done} of {of}{part}, {self.seconds:.1f} s{coarse}{at}"
 
     def warning(self) -> str:
         """That the picture has lost something, for the text beside; empty if nothing."""
@@ -233,6 +237,7 @@ class Viewport:
         self.bands.learn(spent, budget / 2)
         self._sample_seconds += spent
         self._compiled += library.compile_count - compiled
+        self._within.look()
         if whole:
             self._sample = None
             self._compiled = 0
@@ -425,6 +430,7 @@ class Viewport:
         if begun.size != self._size:
             images.pool.trim()  # nobody will ask for the images of the old size again
         self.frame, self.scale, self._size = frame, begun.scale, begun.size
+        self._within = WithinSample(frame)
         self.seconds, self._finished, self._sample, self._compiled = 0.0, False, None, 0
         self._begun_s, self._begun_for = begun.seconds, (_view_key(begun.camera), begun.size, begun.border)
         self._waits = begun.why == CLIMBS
