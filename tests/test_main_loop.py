@@ -121,7 +121,7 @@ def test_time_that_is_left_forgets_the_first_sample_once_there_is_another():
 
 
 def test_a_render_says_what_it_does_within_a_sample_and_how_long_it_takes():
-    """Of two techniques that take as long the first is done, and half of the second: 3 s for 3/4 of a sample."""
+    """Of two techniques that take as long the first is done, and half of the second: 3 s for 3/4 of the first sample."""
     technique = namedtuple("Technique", "label name")
     plan = type("Plan", (), {"techniques": [technique("One", "one"), technique("Other", "other")]})
     bands = type("Bands", (), {"part": 0.5})
@@ -129,7 +129,7 @@ def test_a_render_says_what_it_does_within_a_sample_and_how_long_it_takes():
     inside = final.Inside(frame, 100.0)
     assert inside.news(100.1) is None and inside.each is None
     assert inside.news(103.0) == "Other"
-    assert inside.done == pytest.approx(0.75) and inside.each == pytest.approx(4.0)
+    assert inside.done == pytest.approx(0.75) and inside.each == pytest.approx(4.0 / final.FIRST_COSTS)
     bands.part = 0.1  # a second pass of the same technique
     inside.news(104.0)
     assert inside.done == pytest.approx(0.75)
