@@ -121,7 +121,7 @@ def test_time_that_is_left_forgets_the_first_sample_once_there_is_another():
 
 
 def test_a_render_says_what_it_does_within_a_sample_and_how_long_it_takes():
-    """Of two techniques that take as long the first is done, and half of the second: 3 s for 3/4 of the first sample."""
+    """Of two techniques that take as long one is done, and half of the other: 3 s for 3/4 of the first sample."""
     technique = namedtuple("Technique", "label name")
     plan = type("Plan", (), {"techniques": [technique("One", "one"), technique("Other", "other")]})
     bands = type("Bands", (), {"part": 0.5})
