@@ -88,7 +88,7 @@ BEAMS = Program(
 # Rays of a picture of one sample for each pixel of the width of what bends them: their beams lie side by side across
 # it, each several pixels wide, however many start at the same place of it. With more samples all have more, and each
 # fewer.
-RAYS_A_PIXEL = 256
+RAYS_A_PIXEL = 160
 LEAST_SIDE = 8
 MOST_VERTICES = 50_000  # of all that bends light: beyond, corners of boxes stand for them
 

@@ -10,7 +10,9 @@
 #include "trace/rays.glsl"
 
 #define INTERFACES 10
-#define MIRRORED_SHARE 0.25  // at least, of rays at the first two interfaces of glass
+// Rays that are mirrored at each of the first two interfaces of glass, at least, but a quarter of all at most.
+#define MIRRORED_RAYS 1000.0
+#define MIRRORED_SHARE 0.25
 #define LEAST_BEAM 1e-3  // of light: where media have taken more, a beam that leaves the scene ends
 
 float dielectric(float cosine, float ior)
@@ -25,9 +27,11 @@ float dielectric(float cosine, float ior)
   return 0.5 * a * a * (1.0 + b * b);
 }
 
-// The part of a stretch that has media around it; false where none has.
-bool within_media(inout vec3 from, inout vec3 to)
+// The part of a stretch that has media around it; false where none has. `even`: these media, as bits, where they are the
+// same along all of it and their number has room in a float; 0: they must be asked for.
+bool within_media(inout vec3 from, inout vec3 to, out uint even)
 {
+  even = 0u;
 #ifdef MEDIA_WORLD
   return true;
 #elif defined(MEDIA_BOUNDED)
@@ -39,13 +43,17 @@ bool within_media(inout vec3 from, inout vec3 to)
   float begin = reach;
   float end = 0.0;
   float at = 0.0;
+  int parts = 0;
   for (int i = 0; i < media_intervals() && at < reach; i++) {
     float until = media_until(i, reach);
+    parts += (inside != 0u && until > at) ? 1 : 0;
+    even = (inside != 0u && until > at) ? inside : even;
     begin = (inside != 0u) ? min(begin, at) : begin;
     end = (inside != 0u) ? max(end, until) : end;
     inside = media_behind(i, inside);
     at = until;
   }
+  even = (parts == 1 && even < (1u << 22u)) ? even : 0u;
   to = from + end * way;
   from += begin * way;
   return end > begin;
@@ -166,8 +174,9 @@ void main()
     // Within a solid of glass none is seen; below a sheet of water, whose light never leaves it again, all of it.
     vec3 from = position;
     vec3 to = position + reach * direction;
-    if (bent && !(inside_glass && is_glass) && kept < 2 && within_media(from, to)) {
-      vec4 start = vec4(from, 1.0);
+    uint even;
+    if (bent && !(inside_glass && is_glass) && kept < 2 && within_media(from, to, even)) {
+      vec4 start = vec4(from, 1.0 + float(even));
       vec4 end = vec4(to, growth);
       vec4 carried = vec4(flux, (width + spread * travelled) * apart + growth * distance(from, position));
       if (kept == 0) {
@@ -208,7 +217,7 @@ void main()
       float turn = fract(dot(floor(gl_FragCoord.xy), lattice) + media_random(choice));
       // What is mirrored there goes to all sides, so that more rays than its share of light are: few would show as streaks,
       // and are as wide as if they were no more, so that they overlap.
-      float share = (i < 2) ? max(reflectance, MIRRORED_SHARE) : reflectance;
+      float share = (i < 2) ? max(reflectance, min(MIRRORED_RAYS / rays, MIRRORED_SHARE)) : reflectance;
       bool mirrored = ((i < 2) ? turn : media_random(seed)) < share;
       flux *= mirrored ? reflectance / share : (1.0 - reflectance) / max(1.0 - share, 1e-6);
       apart *= inversesqrt(max(mirrored ? reflectance : 1.0 - share, 1e-4));
