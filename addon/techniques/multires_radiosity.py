@@ -35,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from functools import cache
 
-from ..film.neighbours import smooth
+from ..film.neighbours import shown_alone, smooth
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
@@ -60,6 +60,7 @@ from .instant_radiosity import (
 # From here on maps of clusters, which do not grow with the picture, cost less than rays of regions.
 MANY_PIXELS = 60_000
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.4  # ranges within a region: share of its depth, and of each axis of unit normals
+FARTHER = 3.0  # times as far as elsewhere rays of pixels look: their grain is filtered here, and blots of lights boil
 LEVELS = Param(
     "levels", "Levels", 3, "Largest regions have 2^levels pixels a side; 0: gather light at every pixel", 0, 5
 )
@@ -197,6 +198,9 @@ class MultiresRadiosity(InstantRadiosity):
         scale = frame.typical_distance
         lights = yield from self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
+        bindings["constants"] = dict(bindings["constants"])  # not of those who gather these lights, too
+        if shown_alone(frame):
+            bindings["constants"]["near_radius"] *= FARTHER
         if not frame.settings.get(self, "near_bounces"):
             bindings["constants"]["deeper"] = 0.0
         yield
