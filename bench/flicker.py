@@ -7,8 +7,9 @@ many samples, in levels of eight bits (sRGB, one exposure for all frames of a sc
     boiling   the same after a blur of 5x5 pixels: what is seen as a picture that breathes
     jitter    peak to peak of the mean error of whole frames
 
-Errors that stand still count for nothing here: they are what other benchmarks measure. Denoised Cycles and EEVEE stand
-beside. References are kept by content.
+Errors that stand still count for nothing here: they are what other benchmarks measure. What the reference's own noise,
+known from its two renders, adds to grain and boiling is taken off. Denoised Cycles and EEVEE stand beside. References
+are kept by content. `--film`: the frames as an animation, engines side by side; `--page` keeps rows of other scenes.
 """
 
 from __future__ import annotations
@@ -19,12 +20,18 @@ from pathlib import Path
 import numpy as np
 
 from bench.cells import ROOT
-from bench.markdown import put_between, table
+from bench.markdown import END, begin, put_between, table
 
 COMMAND = "python -m bench flicker"
 PAGE = ROOT / "docs" / "flicker.md"
 SIZE, FRAMES, STEP_PIXELS, BLUR = (160, 120), 10, 1.3, 5
 REFERENCE_SAMPLES = 256  # of each of the two renders
+HEAD = ("scene", "engine", "samples", "frames", "grain", "boiling", "jitter")
+PEERS = (
+    *(("Cycles, denoised", "CYCLES", samples, (("use_denoising", True),)) for samples in (1, 4, 16)),
+    *(("EEVEE", "BLENDER_EEVEE", samples, ()) for samples in (1, 16)),
+)
+FILM_MS, GAP = 200, 4  # a frame of the animation stands so long; pixels between engines
 SCENES = ("window_interior", "cornell_box", "sky_courtyard")
 
 
@@ -32,7 +39,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scenes", nargs="+", default=list(SCENES), help="samples, rooms of `bench media`, .blend files"
     )
-    parser.add_argument("--samples", type=int, nargs="+", default=[1, 16])
+    parser.add_argument("--samples", type=int, nargs="+", default=[1, 4, 16])
+    parser.add_argument(
+        "--reference", type=int, default=REFERENCE_SAMPLES, help="samples of each of two renders by Cycles"
+    )
+    parser.add_argument("--film", type=Path, help="write frames into this GIF: first samples, 4 of Cycles, reference")
     parser.add_argument("--frames", type=int, default=FRAMES)
     parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")
     parser.add_argument("--no-peers", action="store_true", help="Candela alone")
@@ -43,15 +54,23 @@ def command(options: argparse.Namespace) -> int:
     import addon
 
     addon.register()
-    rows = [["scene", "engine", "samples", "grain", "boiling", "jitter"]]
+    rows = []
     for scene in options.scenes:
         for row in measured(scene, options):
             rows.append(row)
             print("  ".join(row), flush=True)
-    print(table(rows))
+    print(table([HEAD, *rows]))
     if options.page:
-        put_between(PAGE, COMMAND, table(rows))
+        kept = other_rows(PAGE.read_text(encoding="utf-8"), {row[0] for row in rows})
+        put_between(PAGE, COMMAND, table([HEAD, *kept, *rows]))
     return 0
+
+
+def other_rows(page: str, scenes: set[str]) -> list[list[str]]:
+    """Rows of the page's table that are not of these scenes."""
+    written = page.partition(begin(COMMAND))[2].partition(END)[0]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in written.splitlines() if line[:2] == "| "]
+    return [row for row in cells if len(row) == len(HEAD) and row[0] not in {*scenes, HEAD[0]}]
 
 
 def measured(name: str, options: argparse.Namespace):
@@ -62,24 +81,45 @@ def measured(name: str, options: argparse.Namespace):
 
     size = tuple(int(edge) for edge in options.size.split("x"))
     entrants = [("Candela", "CANDELA", n, ()) for n in options.samples]
-    if not options.no_peers:
-        entrants += [("Cycles, denoised", "CYCLES", 4, (("use_denoising", True),)), ("EEVEE", "BLENDER_EEVEE", 16, ())]
+    entrants += () if options.no_peers else PEERS
     shown_as = opened(name)
     scene = bpy.context.scene
     start = scene.camera.matrix_world.copy()
-    truths = [
-        reference(scene, REFERENCE_SAMPLES, size=size).images["combined"][..., :3]
-        for _ in moved(scene, start, options.frames, size)
-    ]
+    found = [reference(scene, options.reference, size=size) for _ in moved(scene, start, options.frames, size)]
+    truths = [one.images["combined"][..., :3] for one in found]
     exposure = 1.0 / max(float(np.percentile(truths[0], 95)), 1e-6)
+    noise = [levels(one.images["combined"][..., :3] + one.half["combined"][..., :3], exposure) for one in found]
+    noise = figures(np.array([one - levels(truth, exposure) for one, truth in zip(noise, truths)]))
+    film = {}
     for label, engine, samples, extra in entrants:
         settings = [(scene.cycles, key, value) for key, value in extra]
         errors = []
         for number in moved(scene, start, options.frames, size):
             shown = render_passes(scene, engine, samples, 1, size=size, extra=settings).images["combined"][..., :3]
             errors.append(levels(shown, exposure) - levels(truths[number], exposure))
+            film.setdefault((engine, samples), []).append(shown)
         grain, boiling, jitter = figures(np.array(errors))
-        yield [shown_as, label, str(samples), f"{grain:.1f}", f"{boiling:.2f}", f"{jitter:.2f}"]
+        grain, boiling = (float(np.sqrt(max(a * a - b * b, 0.0))) for a, b in zip((grain, boiling), noise))
+        yield [
+            shown_as, label, str(samples), str(options.frames), f"{grain:.1f}", f"{boiling:.2f}", f"{jitter:.2f}"
+        ]  # fmt: skip
+    if options.film:
+        chosen = [film[key] for key in (("CANDELA", options.samples[0]), ("CYCLES", 4)) if key in film]
+        write_film(options.film, [*chosen, truths], exposure)
+
+
+def write_film(path: Path, engines: list[list[np.ndarray]], exposure: float) -> None:
+    """An animation of the frames of several engines, side by side, forth and back."""
+    from PIL import Image
+
+    frames = []
+    for shown in zip(*engines):
+        parts = [np.pad(levels(one, exposure), ((0, 0), (0, GAP), (0, 0)), constant_values=255.0) for one in shown]
+        pixels = np.clip(np.concatenate(parts, axis=1)[::-1, :-GAP] + 0.5, 0, 255).astype(np.uint8)
+        frames.append(Image.fromarray(pixels))
+    frames += frames[-2:0:-1]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=FILM_MS, loop=0, optimize=True)
 
 
 def opened(name: str) -> str:

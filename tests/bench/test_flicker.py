@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from bench.flicker import figures
+from bench.flicker import HEAD, figures, other_rows, write_film
+from bench.markdown import END, begin, table
 
 
 def test_errors_that_stand_still_are_no_flicker():
@@ -23,3 +24,17 @@ def test_grain_of_single_pixels_is_a_fifth_after_the_blur():
     noise = np.random.default_rng(2).standard_normal((10, 60, 80, 3))
     grain, boiling, _ = figures(noise)
     assert boiling / grain == pytest.approx(0.2, rel=0.05)
+
+
+def test_a_page_keeps_rows_of_scenes_that_were_not_measured():
+    rows = [["hall", *"123456"], ["box", *"123456"]]
+    page = f"a\n{begin('python -m bench flicker')}\n\nMade.\n\n{table([HEAD, *rows])}\n\n{END}\n| b |\n"
+    assert other_rows(page, {"box"}) == rows[:1]
+
+
+def test_a_film_goes_forth_and_back(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    frames = [np.full((4, 6, 3), k / 4) for k in range(3)]
+    write_film(tmp_path / "film.gif", [frames, frames], 1.0)
+    with image.open(tmp_path / "film.gif") as film:
+        assert (film.n_frames, film.size) == (4, (16, 4))
