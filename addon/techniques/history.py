@@ -10,8 +10,9 @@ so that n pictures of a still surface have the error of n samples. The same surf
 plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees). What was hidden before has no
 history: its light is the fresh one. Indirect light is filtered over neighbours (film/neighbours.py) when it is
 joined, not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. While objects move n is
-at most FEW, and light straight from sources is kept within the spread of what is fresh on 5x5 pixels, so that shadows
-move along. After any other edit there is no history at all (frame/history.py); what shines is never carried, since it
+at most FEW, for light straight from lamps only where a moving object's box stands or stood before one of them; there it
+is kept within the spread of what is fresh on 5x5 pixels, so that shadows move along. (Everywhere, where the world or
+meshes shine.) After any other edit there is no history at all (frame/history.py); what shines is never carried: it
 moves otherwise than its surface.
 
 In drafts of the viewport, and, where `animation` says so, in final pictures of one sample drawn one after the other
@@ -20,7 +21,7 @@ early: all machines would need the same past.
 
 | cost | per picture |
 |---|---|
-| pass | 16 + 4 fetches of history per pixel; 50 more while objects move |
+| pass | 16 + 4 fetches of history per pixel; while objects move 12 for each of them and lamp, 50 in their shadows |
 | images | 4 RGBA32F of the picture's size, kept |
 
 Bias: light that changes as things move lags by up to FEW pictures; sharp shadows of moved cameras are looked up
@@ -40,8 +41,10 @@ from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
+from ..materials.compiler import may_emit
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
+from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 MANY, FEW = 32, 8  # samples that history counts for at most; while objects move
@@ -74,7 +77,8 @@ SHOW = passes.fullscreen_program(
     ),
     outputs=(("VEC4", "out_light"),),
 )
-ROWS_OF_VIEW, ROWS_OF_OBJECT = 4, 6
+ROWS_OF_VIEW = 5
+MOST_LAMPS = 16  # of which it is looked up whether what moves is before them
 SLACK = 0.02  # of a box's longest side, by which it is larger than its object
 
 
@@ -158,16 +162,29 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
     if before is None:
         return np.zeros((ROWS_OF_VIEW, 4))
     origin = frame.geometry.origin
-    rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved))]
+    lamps = [] if _other_light(frame) else frame.emitters
+    rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved)), (len(lamps), float(not lamps), 0.0, 0.0)]
     meshes = frame.snapshot.meshes
     for one in frame.snapshot.instances:
         if one.key not in before.moved:
             continue
+        moved, mesh = before.moved[one.key], meshes[one.mesh]
         rows += [
-            *_between(before.moved[one.key], origin, before.origin),
-            *_into_box(one.matrix, meshes[one.mesh], origin),
+            *_between(moved, origin, before.origin),
+            *_into_box(one.matrix, mesh, origin),
+            *_into_box(moved @ one.matrix, mesh, before.origin),
         ]
+    rows += [
+        (*one.centre, -1.0 - np.tan(one.radius) if one.kind == lights.SUN else one.reach) for one in lamps
+    ]  # fmt: skip
     return np.array(rows, np.float64)
+
+
+def _other_light(frame: Frame) -> bool:
+    """Whether there is light whose shadows are not looked for: of the world, of meshes, of very many lamps."""
+    snapshot = frame.snapshot
+    glows = any(may_emit(snapshot.materials[slot].graph) for slot in snapshot.used_materials)
+    return glows or frame.environment.power > 0 or len(frame.emitters) > MOST_LAMPS
 
 
 def _between(matrix: np.ndarray, now: np.ndarray, then: np.ndarray) -> np.ndarray:

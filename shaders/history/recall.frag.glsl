@@ -2,10 +2,14 @@
 //
 // Both without the surface's colour. The picture before is looked up where the camera and the object were then, in four
 // pixels, of which those count that lie on the same surface: on its tangent plane, near the place, facing alike. `before_table`:
-// rows x, y, w of its view; its render origin from this one's, w: objects that have moved; six texels of each of those:
-// from where it is to where it was, and to its box, within -1..1.
+// rows x, y, w of its view; its render origin from this one's, w: objects that have moved; how many lamps, y: 1 where there
+// is other light than theirs; nine texels of each object: from where it is to where it was, and to its box, within -1..1,
+// now and then; a texel of each lamp: place and reach, or the way to a sun and -1 - tangent of its radius.
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
+
+#define OBJECTS 5  // texel of the first one
+#define TEXELS 9  // of each
 
 struct Found {
   vec3 direct;
@@ -106,6 +110,65 @@ void nearby(ivec2 pixel, vec3 position, vec3 normal, float tolerance, out vec3 l
   high = mean + spread;
 }
 
+// The part of 0..1 that is left where t * slope <= room.
+void clip(float slope, float room, inout vec2 part)
+{
+  if (slope > 0.0) {
+    part.y = min(part.y, room / slope);
+  }
+  else if (slope < 0.0) {
+    part.x = max(part.x, room / slope);
+  }
+  else if (room < 0.0) {
+    part.y = -1.0;
+  }
+}
+
+// Whether an object's box is between a place and some point of a lamp: the way to its middle widens towards it.
+bool is_between(int box, vec3 position, vec4 lamp)
+{
+  vec3 here = moved_by(box, position);
+  vec3 there = lamp.xyz;
+  float reach = lamp.w;
+  if (lamp.w < 0.0) {
+    float metre = length(moved_by(box, position + lamp.xyz) - here);
+    float beyond = 2.0 * (length(here) + 2.0) / max(metre, 1e-20);
+    there = position + beyond * lamp.xyz;
+    reach = beyond * (-1.0 - lamp.w);
+  }
+  vec3 way = moved_by(box, there) - here;
+  vec2 part = vec2(0.0, 1.0);
+  for (int axis = 0; axis < 3; axis++) {
+    float wider = reach * length(table(box + axis).xyz);
+    clip(way[axis] - wider, 1.0 - here[axis], part);
+    clip(-way[axis] - wider, 1.0 + here[axis], part);
+  }
+  return part.x <= part.y;
+}
+
+// Whether what moves may have changed the light that comes straight to a place: it stands or stood before a lamp.
+bool may_have_changed(vec3 position, vec3 shift, int moved)
+{
+  int lamps = int(table(4).x);
+  if (table(4).y > 0.0) {
+    return true;
+  }
+  for (int k = 0; k < moved; k++) {
+    int box = OBJECTS + TEXELS * k + 3;
+    if (max_component(abs(moved_by(box, position))) < 1.0) {
+      continue;  // its own shadows move along
+    }
+    for (int i = 0; i < lamps; i++) {
+      vec4 lamp = table(OBJECTS + TEXELS * moved + i);
+      vec4 then = (lamp.w < 0.0) ? lamp : vec4(lamp.xyz + shift, lamp.w);
+      if (is_between(box, position, lamp) || is_between(box + 3, position + shift, then)) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 vec3 reflected(vec3 light, vec3 color, vec3 fresh)
 {
   return vec3((color.r > 1e-3) ? light.r * color.r : fresh.r, (color.g > 1e-3) ? light.g * color.g : fresh.g,
@@ -133,7 +196,7 @@ void main()
   int moved = int(table(3).w);
   bool within = false;
   for (int k = 0; k < moved && found.weight == 0.0; k++) {
-    int row = 4 + 6 * k;
+    int row = OBJECTS + TEXELS * k;
     vec3 inside = moved_by(row + 3, position.xyz);
     if (max_component(abs(inside)) < 1.0) {
       vec3 there = moved_by(row, position.xyz);
@@ -149,8 +212,9 @@ void main()
   vec3 indirect = arriving(new_indirect.rgb, color);
   vec2 counts = vec2(0.0);
   if (found.weight > 0.0) {
-    counts = min(found.counts, (moved > 0) ? vec2(most_moved) : vec2(most_still));
-    if (moved > 0) {
+    counts = min(found.counts, (moved > 0) ? vec2(within ? most_moved : most_still, most_moved) : vec2(most_still));
+    if (moved > 0 && may_have_changed(position.xyz, shift, moved)) {
+      counts.x = min(counts.x, most_moved);
       vec3 low;
       vec3 high;
       nearby(pixel, position.xyz, normal, tolerance, low, high);

@@ -12,7 +12,7 @@ from addon.frame.run import Renderer
 from addon.gfx import images
 from addon.lighting import probes
 from addon.snapshot import SnapshotCache, camera_of_scene, take
-from addon.techniques.history import _between, _into_box
+from addon.techniques.history import FEW, _between, _into_box
 from addon.ui.properties import settings_of
 from tests.viewport.region import Region
 
@@ -116,3 +116,14 @@ def test_cameras_side_by_side_have_the_same_probes(drafts, monkeypatch):
     assert len(first) > 20 and len(common) > 0.6 * len(first)
     apart = [np.linalg.norm(first[one] - second[one]) for one in common]
     assert np.median(apart) < 0.05
+
+
+def test_light_is_kept_near_fresh_light_only_where_something_moves_before_a_lamp(scene, drafts):
+    """A cube that moves on the floor's one side leaves the history of the other side alone: FEW is no limit there."""
+    bpy.data.objects["Cube"].location.x -= 0.5
+    for k in range(12):
+        bpy.data.objects["Cube"].location.x += 0.02
+        frame = drafts()
+    counts = images.read(frame.images["history.place"])[..., 3]
+    assert frame.before.moved and counts.max() == pytest.approx(12.0)
+    assert 0.05 < (counts[counts > 0] <= FEW + 1).mean() < 0.95
