@@ -121,7 +121,7 @@ def test_cameras_side_by_side_have_the_same_probes(drafts, monkeypatch):
 def test_light_is_kept_near_fresh_light_only_where_something_moves_before_a_lamp(scene, drafts):
     """A cube that moves on the floor's one side leaves the history of the other side alone: FEW is no limit there."""
     bpy.data.objects["Cube"].location.x -= 0.5
-    for k in range(12):
+    for _ in range(12):
         bpy.data.objects["Cube"].location.x += 0.02
         frame = drafts()
     counts = images.read(frame.images["history.place"])[..., 3]
