@@ -1,7 +1,7 @@
 // The mean of what walks bring over places of the object around, per channel within half a free path and a fraction of the
 // pixels' window: light from beyond the window changes over no less; of many samples less is asked, by the fourth root of
 // their number, so that what it blurs goes with them (lighting/walked_light.py). Pixels come in pairs, one on either side, so that
-// light which rises or falls evenly stays as it is, at edges, too.
+// light which rises or falls evenly stays as it is, mostly so at edges.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "subsurface/image.glsl"
@@ -9,6 +9,7 @@
 #include "subsurface/walked.glsl"
 
 #define PAIRS 12
+#define ALONE 0.3     // of a pixel's weight where its other one shows something else: less noise for some bias
 #define GOLDEN 2.39996323
 #define PATHS 0.5     // free paths, and
 #define PIXELS 0.6     // or widths of a pixel
@@ -66,13 +67,22 @@ void main()
       continue;
     }
     ivec2 across = 2 * pixel - other;
-    vec3 weight = min(tap_weight(other, object, position, normal, face, widest + pixel_size, narrower),
-                      tap_weight(across, object, position, normal, face, widest + pixel_size, narrower));
-    if (weight.x + weight.y + weight.z > 0.0) {
-      direct += weight * (walked_direct_fetch(other).rgb + walked_direct_fetch(across).rgb);
-      indirect += weight * (walked_indirect_fetch(other).rgb + walked_indirect_fetch(across).rgb);
-      left += weight * (walked_near_fetch(other).rgb + walked_near_fetch(across).rgb);
-      whole += 2.0 * weight;
+    vec3 weight1 = tap_weight(other, object, position, normal, face, widest + pixel_size, narrower);
+    vec3 weight2 = tap_weight(across, object, position, normal, face, widest + pixel_size, narrower);
+    vec3 both = min(weight1, weight2);
+    weight1 = mix(both, weight1, ALONE);
+    weight2 = mix(both, weight2, ALONE);
+    if (max_component(weight1) > 0.0) {
+      direct += weight1 * walked_direct_fetch(other).rgb;
+      indirect += weight1 * walked_indirect_fetch(other).rgb;
+      left += weight1 * walked_near_fetch(other).rgb;
+      whole += weight1;
+    }
+    if (max_component(weight2) > 0.0) {
+      direct += weight2 * walked_direct_fetch(across).rgb;
+      indirect += weight2 * walked_indirect_fetch(across).rgb;
+      left += weight2 * walked_near_fetch(across).rgb;
+      whole += weight2;
     }
   }
   out_direct.rgb = direct / whole;
