@@ -99,7 +99,7 @@ class Turns:
         self._reading: Reading | None = None
         self._measured = 0
         self._weights: list[Mapping[int, float]] | None = None
-        self._asks = False
+        self._asks = self._known = False
 
     def begin(self, frame: Frame, names: Sequence[str], may_rest: bool = True) -> None:
         """`names`: the images that the technique adds to; unless it `may_rest`, all samples have all of it."""
@@ -107,10 +107,8 @@ class Turns:
         self._names = tuple(names)
         self._light = tuple(name for name in names if name.startswith("radiance."))
         settings = frame.settings
-        self._asks = (
-            may_rest and settings.whole and not settings.may_end_early and frame.numbers is None
-            and settings.samples >= FEWEST_SAMPLES and not _clamped(frame)
-        )  # fmt: skip
+        self._known = may_rest and settings.whole and not settings.may_end_early and frame.numbers is None
+        self._asks = self._known and settings.samples >= FEWEST_SAMPLES and not _clamped(frame)
 
     def weight(self, frame: Frame, part: int = 0) -> float:
         """Of a part in this sample; 0: it is not drawn."""
@@ -119,6 +117,11 @@ class Turns:
         if self._weights is None or frame.is_first:
             return 1.0
         return self._weights[min(part, len(self._weights) - 1)].get(frame.sample, 0.0)
+
+    @property
+    def may_last(self) -> bool:
+        """Whether what one sample makes may serve those behind it, too."""
+        return self._known
 
     @property
     def may_rest(self) -> bool:
@@ -134,9 +137,10 @@ class Turns:
 
     def renews(self, frame: Frame, apart: int) -> bool:
         """Whether what serves several samples once it is made is to be made anew in this one: in samples that have the
-        first part, at least `apart` samples apart in the mean; in all of them where it cannot rest."""
+        first part, at least `apart` samples apart in the mean; in all of them of pictures whose mean is not all that
+        is shown."""
         if self._weights is None:
-            return frame.is_first or not self.may_rest
+            return not self._known or frame.sample % apart == 0
         return frame.sample in turns(self._samples, (*self._apart[:1], max(self._apart[0], self._most_apart(apart))))
 
     def _most_apart(self, apart: int) -> int:

@@ -10,6 +10,9 @@ clear glass leaves as it is. Shadow rays of what is answered for take glass as o
 photons of it. All glass counts there, so a pane beside a lens is a caster, too. A scene in which all glass is flat
 panes and nothing else throws caustics is left to straight light, as is right for panes.
 
+Where all casters are closed convex meshes that only mirror, and no lamp stands among them, their light never
+converges (`spreads`): few photons have all of it.
+
 Blender's switches: with Reflective or Refractive caustics off (Cycles' Light Paths), reflected or refracted light is
 left out, but for glass with Shadow Caustics: objects set to cast them, under lights set to give them. Where the Cycles
 add-on is off, the switches do not exist and all is on. Whether an object is to receive such caustics is not followed:
@@ -38,6 +41,10 @@ SMOOTH = 0.25  # roughness
 METALLIC = 0.5
 MARGIN = 0.02  # of a caster's box, for what its float32 bounds miss
 FLAT = 0.999  # cosine between normals of a pane's faces
+MOST_LOOKED_AT = 200_000  # triangles of a mesh of which it is asked whether it is convex
+LEAST_BENT = 0.4  # share of a convex mesh's edges at which it bends: a cube's faces would throw patches with edges
+_FEWEST_EDGES = 100
+_BUMPS = ("ShaderNodeBump", "ShaderNodeNormalMap", "ShaderNodeDisplacement", "ShaderNodeVectorDisplacement")
 _CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHoldout", "ShaderNodeBsdfRayPortal")
 _MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
 
@@ -71,6 +78,7 @@ class Casters:
     high: np.ndarray
     lights: frozenset[str]  # keys of the lights that are answered for
     bent: frozenset[str]  # of those whose refracted light is wanted, too
+    spreads: bool = False  # nothing here makes light converge
 
     @property
     def materials(self) -> frozenset[int]:
@@ -116,7 +124,8 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     low, high = groups(*grown(boxes[:, 0], boxes[:, 1]))
     keys = frozenset(light.key for light in given).union(others)
     bent = frozenset(light.key for light in given if light.caustics) if by_flags else keys
-    return Casters(frozenset(glass), mirrors, low, high, keys, bent)
+    spreads = not glass and _only_spread(snapshot, shown, mirrors, given, boxes)
+    return Casters(frozenset(glass), mirrors, low, high, keys, bent, spreads)
 
 
 def _other_sources(snapshot: Snapshot, glass: set[int], mirrors: dict[int, float]) -> tuple[str, ...]:
@@ -223,6 +232,52 @@ def _is_pane(mesh: Mesh) -> bool:
     cosine = across @ axis / np.maximum(area, 1e-300)
     front, back = area[cosine > FLAT].sum(), area[cosine < -FLAT].sum()
     return bool(front + back > 0.8 * area.sum() and abs(front - back) < 0.1 * (front + back))
+
+
+def _only_spread(snapshot: Snapshot, shown: list[Instance], mirrors: Iterable[int], given, boxes: np.ndarray) -> bool:
+    """Whether casters without glass make no light converge."""
+    if any(node.type in _BUMPS for k in mirrors for node in snapshot.materials[k].graph.nodes.values()):
+        return False
+    places = np.array([light.matrix[:3, 3] for light in given if light.kind != "SUN"]).reshape(-1, 3)
+    among = (boxes[:, 0, None] <= places) & (places <= boxes[:, 1, None])
+    return not among.all(axis=2).any() and all(is_convex(snapshot.meshes[mesh]) for mesh in {one.mesh for one in shown})
+
+
+_convex: dict[tuple, bool] = {}  # by what tells a mesh's content
+
+
+def is_convex(mesh: Mesh) -> bool:
+    """Whether a mesh is closed, and bends away from itself at many edges and towards itself at none."""
+    key = (mesh.key, mesh.version, mesh.triangle_count, mesh.bounds_min.tobytes(), mesh.bounds_max.tobytes())
+    if key not in _convex:
+        if len(_convex) > 256:
+            _convex.clear()
+        _convex[key] = mesh.triangle_count <= MOST_LOOKED_AT and _bends_away(mesh)
+    return _convex[key]
+
+
+def _bends_away(mesh: Mesh) -> bool:
+    triangles = mesh.corner_vertices[mesh.triangle_corners].astype(np.int64)  # (T, 3)
+    edges = np.sort(np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    opposite = np.concatenate([triangles[:, (k + 2) % 3] for k in range(3)])
+    owner = np.tile(np.arange(len(triangles)), 3)
+    order = np.argsort(edges[:, 0] * len(mesh.positions) + edges[:, 1], kind="stable")
+    if len(order) < 2 * _FEWEST_EDGES or len(order) % 2:
+        return False
+    one, other = order[::2], order[1::2]
+    third = np.r_[order[2::2], order[:1]]
+    if (edges[one] != edges[other]).any() or (edges[other] == edges[third]).all(axis=1).any():
+        return False  # an edge of one triangle, or of more than two
+    places = mesh.positions.astype(np.float64)
+    corners = places[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    if not (length > 0).all():
+        return False
+    offset = places[opposite[other]] - places[edges[one, 0]]
+    sine = np.einsum("ij,ij->i", (normals / length[:, None])[owner[one]], offset) / np.linalg.norm(offset, axis=1)
+    sine *= -np.sign(sine.sum())  # normals may all point inwards
+    return bool((sine < 1e-4).all() and (sine < -1e-4).mean() >= LEAST_BENT)
 
 
 def boxes_of(frame: Frame, found: Casters) -> Iterable[tuple[np.ndarray, np.ndarray]]:

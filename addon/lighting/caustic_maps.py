@@ -10,8 +10,9 @@ of the texels around its place whose surface lies on its plane. Shadow rays of h
 answered for, as those of pixels do.
 
 Cost, per sample and view: a draw of the surfaces, the splats, a pass over the map; per round of rays a pass over the
-hits for each CELLS views, which share an image; 4 x 4 bytes a texel of SIDE x SIDE for each of its cells, and of one
-view 7 x 4 x 4 more.
+hits for each CELLS views, which share an image; 4 x 4 bytes a texel for each of its cells, and of one view 7 x 4 x 4
+more. A map has as many texels along each side as the picture has pixels, from LEAST_SIDE to SIDE: mirrors show what
+they show smaller than it is.
 
 Bias: the map's texels, and what the light's view does not show. At most MOST views of a sample are kept, those that
 come first; lights beyond them keep their grey shadows there.
@@ -39,7 +40,7 @@ from .light_views import LightBuffers, LightView, widened
 from .path_sources import ShadedLobes
 from .photons import MAP, Bundle, LitView, Photons
 
-SIDE, MOST = 384, 8
+LEAST_SIDE, SIDE, MOST = 128, 384, 8
 COLUMNS, ROWS = 4, 2
 CELLS = COLUMNS * ROWS  # of an image of kept maps, which a pass over hits asks all
 EXTENT = 3.0  # of the map, beside the casters as the light sees them
@@ -73,9 +74,8 @@ def at_hits_program(transmission: bool) -> Program:
         "caustics/at_hits.frag.glsl",
         textures=(*SEEN, *(("RGBA32F", name) for name in ("met_path", "hit_passed", "kept_maps"))),
         blocks=((KEPT_VIEWS, "kept_views"),),
-        constants=(("INT", "map_count"),),
+        constants=(("INT", "map_count"), ("INT", "map_side")),
         defines=(
-            ("MAP_SIDE", str(SIDE)),
             ("MAP_COLUMNS", str(COLUMNS)),
             *((("TRANSMISSION", "1"),) if transmission else ()),
         ),
@@ -91,6 +91,7 @@ class KeptMaps:
     """Up to CELLS maps in one image: irradiance (rgb) and distance (w; 0: nothing) of what a light's view shows."""
 
     image: images.Image
+    side: int  # of a map
     block: Block | None = None
     views: list[dict] = field(default_factory=list)  # fields of VIEW, by cell
 
@@ -98,7 +99,12 @@ class KeptMaps:
     def next_corner(self) -> tuple[int, int]:
         """Of the first cell that is free."""
         number = len(self.views)
-        return number % COLUMNS * SIDE, number // COLUMNS * SIDE
+        return number % COLUMNS * self.side, number // COLUMNS * self.side
+
+
+def side_of(frame: Frame) -> int:
+    """Texels along a side of a map."""
+    return int(np.clip(max(frame.size), LEAST_SIDE, SIDE))
 
 
 class CausticMaps:
@@ -157,11 +163,13 @@ class CausticMaps:
         it."""
         low, high = frame.geometry.bounds_min, frame.geometry.bounds_max
         corners = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
-        view = widened(light.view, EXTENT, corners[None] - frame.geometry.origin, SIDE, self._shift)
+        side = side_of(frame)
+        view = widened(light.view, EXTENT, corners[None] - frame.geometry.origin, side, self._shift)
         block, seen = self._receivers.receivers(frame, technique, view, casters.materials)
         caught = {name: seen[name.replace("receiver", "surface")] for _, name in MAP}
-        if self._map is None:
-            self._map = images.Target((images.pool.take(SIDE, SIDE, "RGBA32F"),))
+        if self._map is None or self._map.size != (side, side):
+            self._give_map()
+            self._map = images.Target((images.pool.take(side, side, "RGBA32F"),))
         self._map.clear()
 
         def splat(bundle: Bundle) -> None:
@@ -179,13 +187,13 @@ class CausticMaps:
         values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
         self._block = _updated(self._block, VIEW, values)
         if not self.maps or len(self.maps[-1].views) == CELLS:
-            self.maps.append(KeptMaps(images.pool.take(COLUMNS * SIDE, ROWS * SIDE, "RGBA32F")))
+            self.maps.append(KeptMaps(images.pool.take(COLUMNS * view.side, ROWS * view.side, "RGBA32F"), view.side))
         kept = self.maps[-1]
         corner = kept.next_corner
         passes.fullscreen(
             KEEP,
             images.Target((kept.image,)),
-            viewport=(*corner, SIDE, SIDE),
+            viewport=(*corner, view.side, view.side),
             textures={"caustic_map": self._map.colors[0], "receiver_position": position},
             blocks={"map_view": self._block},
             constants={"cell_corner": corner},
@@ -209,10 +217,13 @@ class CausticMaps:
     def release(self) -> None:
         """Give all images back."""
         self.end()
-        if self._map is not None:
-            images.pool.give(self._map.colors[0])
+        self._give_map()
         self._receivers.release()
         self.__init__()
+
+    def _give_map(self) -> None:
+        if self._map is not None:
+            images.pool.give(self._map.colors[0])
 
 
 def _updated(block: Block | None, struct: Struct, values: dict) -> Block:
@@ -248,6 +259,6 @@ def add_at_hits(
             where=where,
             textures={**bound, "kept_maps": one.image},
             blocks={"kept_views": one.block},
-            constants={"map_count": len(one.views)},
+            constants={"map_count": len(one.views), "map_side": one.side},
         )
         frame.count(technique, "passes")

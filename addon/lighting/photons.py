@@ -108,6 +108,7 @@ WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on 
 VERY_WIDE, MANY = 0.3, 128  # and from which on its image is wide, too: below so many samples it has several points
 MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
 LEAST_SIDE = 48
+SPREAD_SIDE = 64  # where nothing makes light converge
 LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
 
 
@@ -216,10 +217,11 @@ class Photons:
             if turn is not None and count > 1:
                 # Sample 0 has its photons before it is known how many others do: those are a set without it.
                 index, sharing, of_turns = max(index - 1, 0), count - (index > 0), frame.settings.samples
-            parts = _points(emitter, boxes, sharing)
+            parts = _points(emitter, boxes, sharing * (MOST_POINTS if casters.spreads else 1))
             strata = sharing * parts if whole else 0  # 1: see _drawn
             strata = -1 if of_turns and sharing == count else strata
-            texels = max(round(side / np.sqrt(parts)), min(side, LEAST_SIDE))
+            grid, least = (min(side, one) for one in ((SPREAD_SIDE, 32) if casters.spreads else (side, LEAST_SIDE)))
+            texels = max(round(grid / np.sqrt(parts)), least)
             for number in range(index * parts, (index + 1) * parts):
                 middle = alone and parts == 1
                 sample = emitter.middle() if middle else emitter.sample(*frame.random_volume_at(number, "light"))

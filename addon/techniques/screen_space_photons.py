@@ -109,9 +109,11 @@ class ScreenSpacePhotons(Technique):
             return
         side = frame.settings.get(self, "grid")
         maps = frame.kept(CausticMaps)
-        renews = self._turns.renews(frame, MAPS_APART)
+        # Few samples of glass need all their maps: which of them mirrors at an inner face is shared out over them.
+        lasting = self._turns.may_rest or (self._turns.may_last and not self._casters.refracting)
+        renews = not lasting or self._turns.renews(frame, MAPS_APART)
         if renews:
-            maps.begin(frame, self._photons.resting(frame, self._casters), self._turns.may_rest)
+            maps.begin(frame, self._photons.resting(frame, self._casters), lasting)
         turn = self._turns.turn(frame) if self._turns.may_rest else None
         with self._turns.drawing(frame) as drawing:
             target = images.Target((drawing.images(0)["radiance.diffuse_indirect"],))

@@ -33,7 +33,7 @@ KeptView view_of_cell(int cell)
   view.up = kept_views.up[cell];
   view.backward = kept_views.backward[cell];
   view.frame = kept_views.frame[cell];
-  view.film = vec4(float(MAP_SIDE));
+  view.film = vec4(float(map_side));
   return view;
 }
 
@@ -49,7 +49,7 @@ vec3 place_of(vec2 texel, vec2 size, float depth)
 // Of the map in the cell at `corner`, whose view is `map_view`.
 vec3 irradiance_at(vec3 position, vec3 normal, ivec2 corner)
 {
-  ivec2 size = ivec2(MAP_SIDE);
+  ivec2 size = ivec2(map_side);
   MapPlace at = map_place(position, size);
   if (!at.inside) {
     return vec3(0.0);
@@ -90,7 +90,7 @@ void main()
   vec3 irradiance = vec3(0.0);
   for (int cell = 0; cell < map_count; cell++) {
     map_view = view_of_cell(cell);
-    irradiance += irradiance_at(place.xyz, normal, MAP_SIDE * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
+    irradiance += irradiance_at(place.xyz, normal, map_side * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
   }
   vec3 reflected = albedo / PI * irradiance;
   vec4 light = vec4(path.rgb * hit_passed_fetch(pixel).rgb * reflected, 0.0);

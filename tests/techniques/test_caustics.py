@@ -2,6 +2,7 @@
 
 import time
 from itertools import pairwise
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from addon.frame import shares
 from addon.frame.ledger import RAN, SKIPPED
-from addon.lighting import photons
+from addon.lighting import caustic_casters, photons
 from addon.lighting.caustic_casters import grown
 from addon.lighting.caustic_maps import CausticMaps
 from addon.lighting.light_views import groups
@@ -751,6 +752,46 @@ def test_glass_that_bends_nothing_leaves_no_trace_in_a_mirror(stage, technique_n
     inside = mirrored[np.hypot(x, y) < 0.3].mean()
     around = mirrored[(np.hypot(x, y) > 0.75) & (np.hypot(x, y) < 0.8)].mean()
     assert inside == pytest.approx(around, rel=0.12)  # by the cosine and the distance of the spot
+
+
+@pytest.mark.slow
+def test_a_ball_that_mirrors_spreads_light_which_few_photons_have(stage, monkeypatch):
+    """Far fewer photons, and one point of a wide lamp in each sample: the same light in the mean of three seeds."""
+    stage.floor()
+    ball(stage, stage.material("ShaderNodeBsdfGlossy", Roughness=0.0), radius=0.5, place=(0, 0, 0.8))
+    stage.light("AREA", location=(0, 0, 4), size=2.0, energy=100.0)
+    stage.camera_above(2.0)
+    stage.scene.candela.slot_indirect = "OFF"
+
+    def light():
+        found = [stage.render(samples=2, size=(32, 32), bounces=2, seed=k)["diffuse_indirect"] for k in range(1, 4)]
+        return np.mean([one[..., :3].sum() for one in found]), stage.ledger.row(PHOTONS).counters["photons"]
+
+    few, least = light()
+    monkeypatch.setattr(caustic_casters, "is_convex", lambda mesh: False)
+    many, most = light()
+    assert least < most / 4
+    assert few == pytest.approx(many, rel=0.03)
+
+
+@pytest.mark.parametrize("shape, convex", [("ball", True), ("cube", False), ("ring", False), ("monkey", False)])
+def test_meshes_that_make_no_light_converge(stage, shape, convex):
+    make = {
+        "ball": lambda: bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=12),
+        "cube": bpy.ops.mesh.primitive_cube_add, "ring": bpy.ops.mesh.primitive_torus_add,
+        "monkey": bpy.ops.mesh.primitive_monkey_add,
+    }  # fmt: skip
+    make[shape]()
+    made = bpy.context.object.data
+    made.calc_loop_triangles()
+    positions = np.array([vertex.co for vertex in made.vertices], np.float32)
+    mesh = SimpleNamespace(
+        key=shape, version=0, positions=positions, bounds_min=positions.min(axis=0), bounds_max=positions.max(axis=0),
+        corner_vertices=np.array([loop.vertex_index for loop in made.loops]),
+        triangle_corners=np.array([triangle.loops for triangle in made.loop_triangles]),
+        triangle_count=len(made.loop_triangles),
+    )  # fmt: skip
+    assert caustic_casters.is_convex(mesh) == convex
 
 
 @pytest.mark.slow
