@@ -3,6 +3,7 @@
 import hashlib
 import os
 import sys
+from importlib.metadata import version
 
 import pytest
 
@@ -22,12 +23,24 @@ def pytest_addoption(parser):
     )  # fmt: skip
 
 
+# What tests the repository and its tools, whatever Blender draws: with the default one alone.
+DEFAULT_BLENDER = "5.2"
+OF_THE_REPOSITORY = (
+    "tests/bench/",
+    "tests/gfx/test_portable.py",
+    "tests/test_docs.py",
+    "tests/test_environment.py",
+    "tests/test_imports.py",
+)
+
+
 def pytest_collection_modifyitems(config, items):
-    wanted = CHOICES[config.getoption("--slow")]
+    wanted, default = CHOICES[config.getoption("--slow")], version("bpy").startswith(DEFAULT_BLENDER)
     kept, left_out = [], []
     for item in items:
         is_slow = item.get_closest_marker("slow") is not None
-        (kept if not is_slow or part_of(item.nodeid) in wanted else left_out).append(item)
+        elsewhere = not default and item.nodeid.startswith(OF_THE_REPOSITORY)
+        (kept if not elsewhere and (not is_slow or part_of(item.nodeid) in wanted) else left_out).append(item)
     if not left_out:
         return
     config.hook.pytest_deselected(items=left_out)
