@@ -10,6 +10,7 @@
 | facing mirrors | two mirrors that face each other show a ball again and again |
 | puddle | a flat sheet of water on dark ground mirrors small lamps by night |
 | screen | an emissive screen just above a glossy floor |
+| softboxes of the world | two in an image of the world, above a ball and a green glass |
 | layers | coats over rough bases: both are of one surface |
 """
 
@@ -141,7 +142,28 @@ def layers() -> None:
     _look((0, -4, 1.4), (0, 0, 0.5), 50)
 
 
+def softboxes_of_the_world() -> None:
+    _table()
+    rows = 64
+    pixels = np.ones((rows, 2 * rows, 4), np.float32)
+    pixels[..., :3] = 0.15
+    pixels[44:50, 20:28, :3], pixels[40:52, 80:100, :3] = (60, 55, 50), (3, 3.5, 4)
+    image = bpy.data.images.new("World", 2 * rows, rows, float_buffer=True)
+    image.pixels.foreach_set(pixels.ravel())
+    tree = bpy.context.scene.world.node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = image
+    shader = next(one for one in tree.nodes if one.type == "BACKGROUND")
+    shader.inputs["Strength"].default_value = 1.0
+    tree.links.new(node.outputs["Color"], shader.inputs["Color"])
+    _ball(_glass(), (-0.5, 0, 0.5), 0.4)
+    wall = [(0, 0.01), (0.3, 0.01), (0.3, 0.9), (0.25, 0.9), (0.25, 0.1), (0, 0.1)]
+    _lathe(_glass("Green", (0.6, 0.9, 0.7, 1)), wall, (0.6, 0.2, 0))
+    _look((0, -3.4, 1.6), (0, 0, 0.4), 45)
+
+
 SCENES = {
-    "softbox": softbox, "tumbler": tumbler, "bottle": bottle, "ice": ice, "perfume": perfume,
+    "softbox": softbox, "softboxes of the world": softboxes_of_the_world,
+    "tumbler": tumbler, "bottle": bottle, "ice": ice, "perfume": perfume,
     "facing mirrors": facing_mirrors, "puddle": puddle, "screen": screen, "layers": layers,
 }  # fmt: skip

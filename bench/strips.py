@@ -206,6 +206,12 @@ STRIPS = {
         _reflection,
         (Entrant("CANDELA", 1), Entrant("CANDELA", 16), CYCLES),
     ),
+    "glass": Strip(
+        (112, 84),
+        ("softbox", "tumbler", "perfume", "ice", "layers", "screen"),
+        _reflection,
+        (Entrant("CANDELA", 1), Entrant("CANDELA", 4), Entrant("CANDELA", 16), CYCLES),
+    ),
 }
 
 
