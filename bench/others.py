@@ -187,12 +187,12 @@ def page(rows: list[Row], options: argparse.Namespace) -> str:
     drawn = [row for row in rows if row.state in ("alike", "off")]
     alike = sum(row.state == "alike" for row in drawn)
     ended = sum(row.state.startswith(ENDED) for row in rows)
-    sources = [("repository", "commit", "what", "files")]
+    sources = [("repository", "commit", "licence", "what", "files")]
     for one in repositories():
         count = sum(row.repository == one["name"] for row in rows)
         if count:
             url = f"https://github.com/{one['name']}/tree/{one['commit']}"
-            sources.append((f"[{one['name']}]({url})", one["commit"][:10], one["about"], str(count)))
+            sources.append((f"[{one['name']}]({url})", one["commit"][:10], one["licence"], one["about"], str(count)))
     table = [("file", "relMSE", "mean", "light paths that differ, of the picture's light", "sentences")]
     rest = [("file", "why there is no comparison")]
     for row in sorted(rows, key=lambda row: -row.error):

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..materials.nodes.inputs import CORNER, FLAT, ISLAND, MARK, PLACE, POINTINESS, STRAND, WAY
+from ..materials.nodes.inputs import CORNER, FLAT, ISLAND, MARK, PLACE, POINTINESS, ROUND, STRAND, WAY
 from .cache import next_version
 from .hair import HairSystem, read_hair
 from .scene import Mesh, Note
@@ -148,7 +148,7 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
         positions, normals, triangles, source = spheres(points, radii)
     corners = triangles.reshape(-1)
     facts = (
-        (lambda: strand_facts(positions, source, points, radii, offsets))
+        (lambda: strand_facts((positions, normals, triangles, source), points, radii, offsets))
         if hair
         else (lambda: point_facts(source, points, radii))
     )
@@ -186,7 +186,7 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
 
 def _facts(wanted: Wanted, made: Callable[[], dict[str, np.ndarray]], corners: np.ndarray) -> dict[str, np.ndarray]:
     """By corner what nodes about strands and points ask for, where they do."""
-    if wanted.attributes.isdisjoint((STRAND, WAY, PLACE, MARK)):
+    if wanted.attributes.isdisjoint((STRAND, WAY, ROUND, PLACE, MARK)):
         return {}
     return {name: np.ascontiguousarray(_finite(values[corners])) for name, values in made().items()}
 
@@ -197,7 +197,7 @@ def _read_particle_hair(system: HairSystem, wanted: Wanted) -> RawMesh:
     positions, normals, triangles, source = tubes(strands.points, strands.radii, strands.offsets)
 
     def facts() -> dict[str, np.ndarray]:
-        return strand_facts(positions, source, strands.points, strands.radii, strands.offsets)
+        return strand_facts((positions, normals, triangles, source), strands.points, strands.radii, strands.offsets)
 
     corners = triangles.reshape(-1)
     curve = np.searchsorted(strands.offsets, source, side="right") - 1

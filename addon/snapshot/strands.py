@@ -19,7 +19,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..materials.nodes.inputs import MARK, PLACE, STRAND, WAY
+from ..materials.nodes.inputs import MARK, PLACE, ROUND, STRAND, WAY
 
 SIDES = 4
 STEPS = 2  # pieces per segment of the spline, as many as Cycles draws by default
@@ -207,13 +207,20 @@ def between(values: np.ndarray, places: tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def strand_facts(
-    positions: np.ndarray, source: np.ndarray, points: np.ndarray, radii: np.ndarray, offsets: np.ndarray
+    tube: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    points: np.ndarray,
+    radii: np.ndarray,
+    offsets: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """What Curves Info tells of the vertices (V, 3) of tubes, which belong to points `source` (V,), in object space.
+    """What Curves Info and Principled Hair ask of the V vertices of tubes (as `tubes` returns them), in object space.
 
     STRAND (V, 4): 1, the share of the way from root to tip, the strand's length, the thickness there. WAY (V, 4): the
-    strand's direction and a random number.
+    strand's direction and a random number. ROUND (V, 4): how far the vertex lies off the strand's axis, in radii, and the tube's sides.
     """
+    positions, normals, triangles, source = tube
+    curves = max(int((np.diff(offsets) >= 2).sum()), 1)
+    sides = max((len(positions) - len(triangles) / 2) / curves, 3.0)
+    wider = np.pi / (sides * np.sin(np.pi / sides))
     places = strand_places(positions, source, points, offsets)
     curve = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     first, last, number = offsets[curve], offsets[curve + 1] - 1, np.arange(len(points))
@@ -224,7 +231,11 @@ def strand_facts(
     share = (number - first) / np.maximum(last - first, 1)
     strand = np.stack([np.ones(len(points)), share, length[curve], 2.0 * radii], axis=1)
     along = np.concatenate([way, random_numbers(len(offsets) - 1)[curve][:, None]], axis=1)
-    return {STRAND: between(strand, places).astype(np.float32), WAY: along[source].astype(np.float32)}
+    off = np.concatenate([wider * normals, np.full((len(normals), 1), sides)], axis=1)
+    return {
+        STRAND: between(strand, places).astype(np.float32), WAY: along[source].astype(np.float32),
+        ROUND: off.astype(np.float32),
+    }  # fmt: skip
 
 
 def point_facts(source: np.ndarray, points: np.ndarray, radii: np.ndarray) -> dict[str, np.ndarray]:

@@ -88,6 +88,14 @@ vec3 direct_light(Receiver r, uint salt)
   vec3 side = r.surface.geometric_normal;
   bool behind = (r.bends || r.surface.kind == LOBE_TRANSLUCENT) && dot(chosen_direction, side) < 0.0;
   vec3 origin = ray_origin(r.surface.position, behind ? -side : side);
+#ifdef SOFT_LOBES
+  SoftLobe soft = soft_lobe_begin(r.surface, r.viewer);
+  if (soft.fibre) {
+    vec3 facing;
+    vec3 start = fibre_start(soft, r.surface.position, chosen_direction, facing);
+    origin = ray_origin(start, facing);
+  }
+#endif
   float reach = light_reach(light, origin, chosen_direction);
   ivec2 hit;
   bool glass_stops = r.bends || (light.flags & LIGHT_GLASS_BLOCKS) != 0;

@@ -50,6 +50,7 @@ void main()
     vec3 direction = s.normal;
     vec3 side = s.geometric_normal;
     bool glossy = false;
+    vec3 start = s.position;
     if (k == 0) {
       vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
       direction = cosine_direction(s.normal, u);
@@ -78,14 +79,21 @@ void main()
         direction = cosine_direction(turn * soft.normal, u);
         side *= turn;
         glossy = soft.glossy;
-        if (dot(direction, side) > 0.0) {
+        if (soft.fibre) {
+          float height = 1.0 - 2.0 * u.x;
+          float ring = sqrt(max(1.0 - height * height, 0.0));
+          direction = vec3(ring * cos(2.0 * PI * u.y), ring * sin(2.0 * PI * u.y), height);
+          start = fibre_start(soft, s.position, direction, side);
+          weight = soft_reflection(soft, direction) * (4.0 * PI);
+        }
+        else if (dot(direction, side) > 0.0) {
           weight = soft_reflection(soft, direction) * PI / max(turn * dot(direction, soft.normal), 1e-6);
         }
       }
 #endif
     }
     if (max_component(weight) > 0.0) {
-      vec3 light = weight * near_radiance(ray_origin(s.position, side), direction, k > 0, roll);
+      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, roll);
       if (glossy) {
         out_glossy.rgb += light;
       }

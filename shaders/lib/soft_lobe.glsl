@@ -1,4 +1,4 @@
-// Lobes without microfacets: microfiber sheen, Ashikhmin's velvet, diffuse transmission, toon. Wide enough that light
+// Lobes without microfacets: microfiber sheen, Ashikhmin's velvet, diffuse transmission, toon, hair. Wide enough that light
 // samples serve them, so no ray is drawn from them.
 //
 // Sheen: Zeltner, Burley & Chiang, "Practical multiple-scattering sheen using linearly transformed cosines", 2022.
@@ -6,6 +6,7 @@
 #include "lib/math.glsl"
 #include "lib/energy.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/hair.glsl"
 
 struct SoftLobe {
   bool exists;
@@ -18,7 +19,33 @@ struct SoftLobe {
   vec3 tangent;   // sheen: towards the viewer; toon: the axis of the cone
   vec3 base;      // the surface's normal without the shader's own bump
   float bump;     // alpha squared of microfacets that deviate as `normal` does from it
+  bool fibre;     // hair: `tangent` is its way, `shape` its roughness along and around
+  HairLobes hair;
+  vec2 scales;    // tilt, narrowing of the first lobe
+  float radius;   // of the fibre
 };
+
+// Decodes what lib/hair.glsl says of a fibre.
+void soft_fibre(inout SoftLobe lobe, Surface s)
+{
+  vec3 root = sqrt(s.glossy_tint);
+  float level = floor(root.z * 255.0 + 0.5);
+  float narrowing = floor(0.5 * level);
+  float code = floor(s.glossy_edge.y * 127.0 + 0.5) * 128.0 + floor(s.glossy_edge.z * 127.0 + 0.5);
+  vec3 side;
+  vec3 up;
+  orthonormal_basis(s.glossy_normal, side, up);
+  float angle = PI * s.tangent_angle;
+  lobe.tangent = (cos(angle) * side + sin(angle) * up) * ((level > 2.0 * narrowing + 0.5) ? 1.0 : -1.0);
+  lobe.shape = vec2(s.glossy_roughness, s.glossy_anisotropy);
+  lobe.scales = vec2((root.y - 0.5) * HAIR_TILTS, narrowing / HAIR_NARROWING);
+  lobe.radius = 0.5 * exp2(code / HAIR_STEPS - HAIR_THINNEST);
+  vec3 absorption = -log(max(hair_unpack(s.glossy_ior), vec3(1e-6)));
+  lobe.hair = hair_lobes(dot(lobe.tangent, lobe.view), hair_beside(lobe.tangent, lobe.normal, lobe.view),
+                         1.0 + HAIR_IORS * root.x, absorption);
+  lobe.weight /= max(hair_albedo(lobe.hair), vec3(1e-6));
+  lobe.bump = 0.0;
+}
 
 SoftLobe soft_lobe_begin(Surface s, vec3 view)
 {
@@ -33,6 +60,7 @@ SoftLobe soft_lobe_begin(Surface s, vec3 view)
   lobe.tangent = s.glossy_normal;
   lobe.base = (s.bump > 0.0) ? s.base_normal : s.normal;
   lobe.bump = 0.0;
+  lobe.fibre = false;
   if (!lobe.exists) {
     return lobe;
   }
@@ -50,6 +78,10 @@ SoftLobe soft_lobe_begin(Surface s, vec3 view)
   else if (s.kind == LOBE_VELVET) {
     float spread = max(s.glossy_roughness, 0.01);
     lobe.shape = vec2(1.0 / (spread * spread), 0.0);
+  }
+  else if (s.kind == LOBE_TOON && s.glossy_tint.z < 0.9) {
+    lobe.fibre = true;
+    soft_fibre(lobe, s);
   }
   else if (s.kind == LOBE_TOON) {
     lobe.shape = 0.5 * PI * vec2(s.glossy_roughness, s.glossy_anisotropy);
@@ -105,6 +137,9 @@ float soft_bump_shadowing(SoftLobe lobe, vec3 light)
 // f * cos for a light direction in world space, without bumps.
 vec3 soft_shape(SoftLobe lobe, vec3 light)
 {
+  if (lobe.fibre) {
+    return lobe.weight * hair_scattering(lobe.hair, lobe.tangent, lobe.view, light, lobe.shape, lobe.scales.x, lobe.scales.y);
+  }
   float z = dot(lobe.normal, light);
   if (lobe.kind == LOBE_SHEEN) {
     vec3 bitangent = cross(lobe.normal, lobe.tangent);
@@ -120,6 +155,17 @@ vec3 soft_shape(SoftLobe lobe, vec3 light)
     return lobe.weight * (max(-z, 0.0) / PI);
   }
   return lobe.weight * toon_reflection(lobe, light);
+}
+
+// Where a ray along `direction` leaves a fibre, which does not shadow itself: on the far side for light that shines through.
+// `facing`: the fibre's normal there.
+#define FIBRE_CLEAR 1.15  // radii: beyond the corners of a tube of few sides
+
+vec3 fibre_start(SoftLobe lobe, vec3 position, vec3 direction, out vec3 facing)
+{
+  vec3 across = direction - lobe.tangent * dot(direction, lobe.tangent);
+  facing = (dot(across, across) > 1e-12) ? normalize(across) : lobe.normal;
+  return position + (facing * FIBRE_CLEAR - lobe.normal) * lobe.radius;
 }
 
 // f * cos for a light direction in world space.

@@ -159,6 +159,11 @@ void main()
         vec3 facing = side * s.geometric_normal;
         float lift = meant_height(light, pixel, (side < 0.0) ? s.sink : s.lift, side * s.normal, towards);
         vec3 start = light_start(s.position, side * s.normal, facing, lift, towards, facing);
+#ifdef SOFT_LOBES
+        if (soft.fibre) {
+          start = fibre_start(soft, s.position, towards, facing);
+        }
+#endif
         visibility = light_visibility(light, pixel, start, facing);
       }
       vec3 passing = light_through_media(light, pixel, s.position, towards);

@@ -6,7 +6,8 @@ void store_closures(Closures c, SurfacePoint point, float covered, float holdout
 {
   vec3 tangent;
   vec3 bitangent;
-  orthonormal_basis(c.glossy_normal, tangent, bitangent);
+  // Of the normal as it will be read: the basis jumps where z changes its sign, on upright walls by the last bit.
+  orthonormal_basis(octahedral_decode(octahedral_encode(c.glossy_normal)), tangent, bitangent);
   float half_turns = 0.0;
   if (dot(c.glossy_tangent, c.glossy_tangent) > 0.0) {
     half_turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / PI + 1.0);

@@ -6,6 +6,7 @@ from .entry import POINT, Attribute, Choice, Entry, Rows, Setting, Socket
 
 SURFACE = "material/input.glsl"
 STRAND, WAY, PLACE, MARK = ".strand", ".strand_way", ".point", ".point_mark"  # and snapshot/strands.py
+ROUND = ".strand_round"
 POINTINESS, ISLAND = ".pointiness", ".island"  # attributes that snapshot/shape.py makes
 CORNER = ".corner"  # which corner of its triangle, made by snapshot/meshes.py
 FLAT = ".flat"  # 1 at corners of faces that are not smooth, read where a material displaces

@@ -20,7 +20,8 @@ import numpy as np
 
 from ..energy import pane_passing
 from ..estimate import Estimate, Interface, Summary, constant
-from .entry import Approximation, Choice, Entry, Expression, Socket
+from .entry import Approximation, Attribute, Choice, Entry, Expression, Socket
+from .inputs import ROUND, STRAND, WAY
 
 WHITE = (1.0, 1.0, 1.0)
 GREY = (0.8, 0.8, 0.8)
@@ -260,20 +261,28 @@ ENTRIES = (
     ),
     Entry(
         "ShaderNodeBsdfHairPrincipled",
-        "shader_hair",
+        "shader_fibre",
         (
+            Attribute("NAMED", name=STRAND),
+            Attribute("NAMED", name=WAY),
+            Attribute("NAMED", name=ROUND),
             Socket("Color", "COLOR", (0.017513, 0.005763, 0.002059)),
             Choice("parametrization", {"COLOR": 0, "MELANIN": 1, "ABSORPTION": 2}),
             Socket("Melanin", "FLOAT", 0.8),
             Socket("Melanin Redness", "FLOAT", 1.0),
             Socket("Tint", "COLOR", WHITE),
             Socket("Absorption Coefficient", "VECTOR", (0.245531, 0.52, 1.365)),
+            Socket("Roughness", "FLOAT", 0.3),
             Socket("Radial Roughness", "FLOAT", 0.3),
+            Socket("Coat", "FLOAT", 0.0),
+            Socket("IOR", "FLOAT", 1.55),
+            Socket("Offset", "FLOAT", 0.0349066),
+            Socket("Random Color", "FLOAT"),
+            Socket("Random Roughness", "FLOAT"),
+            Socket("Random", "FLOAT", implicit="-1.0"),
             NORMAL,
         ),
-        include="material/shader.glsl",
-        note="Principled Hair BSDF is drawn as a diffuse strand of the fibre's colour that lets half of its light "
-        "through, without highlights.",
+        include="material/hair.glsl",
         summary=_soft_diffuse,
     ),
     Entry(
