@@ -82,7 +82,7 @@ bpy.ops.mesh.primitive_cube_add(location=(0, 0, -5))
 material = bpy.data.materials.new("Marble")
 material.use_nodes = True
 nodes, links = material.node_tree.nodes, material.node_tree.links
-unknown = nodes.new("ShaderNodeBsdfHairPrincipled")
+unknown = nodes.new("ShaderNodeBsdfRayPortal")
 links.new(unknown.outputs[0], next(n for n in nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
 bpy.context.object.data.materials.append(material)
 save("unknown_node.blend")
@@ -184,7 +184,7 @@ def test_plan_says_what_runs_and_why_the_rest_does_not(tmp_path):
 def test_plan_names_material_and_node(blends, tmp_path):
     done = candela("plan", blends / "unknown_node.blend", folder=tmp_path)
     assert done.returncode == 0 and done.stderr == ""
-    assert "'Marble'" in done.stdout and "Principled Hair BSDF" in done.stdout
+    assert "'Marble'" in done.stdout and "Ray Portal BSDF" in done.stdout
 
 
 @pytest.mark.slow

@@ -215,7 +215,8 @@ def strand_facts(
     """What Curves Info and Principled Hair ask of the V vertices of tubes (as `tubes` returns them), in object space.
 
     STRAND (V, 4): 1, the share of the way from root to tip, the strand's length, the thickness there. WAY (V, 4): the
-    strand's direction and a random number. ROUND (V, 4): how far the vertex lies off the strand's axis, in radii, and the tube's sides.
+    strand's direction and a random number. ROUND (V, 4): how far the vertex lies off the strand's axis, in radii, and
+    the tube's sides.
     """
     positions, normals, triangles, source = tube
     curves = max(int((np.diff(offsets) >= 2).sum()), 1)

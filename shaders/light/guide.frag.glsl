@@ -25,11 +25,16 @@ void main()
   float ring = sqrt(max(1.0 - z * z, 0.0));
   vec3 direction = vec3(ring * cos(azimuth), ring * sin(azimuth), z);
   bool translucent = s.kind == LOBE_TRANSLUCENT && max_component(s.glossy_weight) > 0.0;
-  float cosine = translucent ? abs(dot(direction, s.normal)) : dot(direction, s.normal);
+  bool fibre = s.kind == LOBE_TOON && s.glossy_tint.z < 0.9;  // lib/hair.glsl: lit from all sides alike
+  float cosine = translucent ? abs(dot(direction, s.normal)) : (fibre ? 0.5 : dot(direction, s.normal));
   if (cosine <= 0.0) {
     return;
   }
   float side = (dot(direction, s.geometric_normal) < 0.0 && translucent) ? -1.0 : 1.0;
   out_useful.y = cosine;
+  if (fibre && dot(direction, s.geometric_normal) < 0.0) {
+    out_useful.x = cosine;  // a ray would have to begin beyond the fibre
+    return;
+  }
   out_useful.x = cosine * clear_path(ray_origin(s.position, side * s.geometric_normal), direction, 1e29, bits.z);
 }

@@ -28,6 +28,11 @@ GREY = (0.8, 0.8, 0.8)
 
 DISTRIBUTION = Choice("distribution", {"GGX": 0, "MULTI_GGX": 1, "BECKMANN": 2, "ASHIKHMIN_SHIRLEY": 3}, missing=1)
 BECKMANN_GLASS = (("distribution", ("BECKMANN",), "Glass of Beckmann's distribution of microfacets is drawn as GGX."),)
+HUANG_SENTENCE = (
+    "Principled Hair of Huang's model is drawn by Chiang's: brighter from front and back, darker from the side. "
+    "With Chiang in the node Cycles shows the same."
+)
+HUANG_HAIR = (("model", ("HUANG",), HUANG_SENTENCE),)
 NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
 TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy")
 
@@ -283,6 +288,7 @@ ENTRIES = (
             NORMAL,
         ),
         include="material/hair.glsl",
+        setting_approximations=HUANG_HAIR,
         summary=_soft_diffuse,
     ),
     Entry(
@@ -353,7 +359,7 @@ ENTRIES = (
         "shader_transparent",
         (Socket("Color", "COLOR", WHITE),),
         include="material/shader.glsl",
-        note="Rays pass straight on instead of leaving elsewhere.",
+        note="Ray Portal BSDF lets rays pass straight on instead of leaving elsewhere.",
         summary=_transparent,
     ),
     *(
