@@ -4,7 +4,8 @@ Each scene is opened in a Blender with a window ($REAL_BLENDER, as for `make tes
 and Blender, and with the newest zip of build/ as the extension. Rendered is chosen; when the picture rests, a lamp, a
 material of glass, and a border are added, one after the other. Of each: seconds until the view shows anything, until it
 shows the scene's light, and until it rests, and the longest time in which Blender did not answer: seconds of the clock,
-and of all threads of this process, which say more where other work shares the processors.
+and of all threads of this process, which say more where other work shares the processors. With `--motion` instead:
+steps in a second and pixels, while a view turns and while an animation is played, beside EEVEE in the same window.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ HEAD = (
     "dearest block, s of processor",
     "at",
 )
-SCRIPT = ROOT / "tests" / "window" / "cold.py"
+COLD, MOTION = (ROOT / "tests" / "window" / f"{name}.py" for name in ("cold", "motion"))
+MOVING = ("scene", "backend", "engine", "turning, steps/s", "pixels", "playing, frames/s", "pixels")
 TIMEOUT_S = 1500
 
 
@@ -50,7 +52,7 @@ def blender(environment: dict[str, str], log: Path, *arguments: object) -> None:
         raise RuntimeError(f"Blender ended with {done.returncode}: {log.read_text(errors='replace')[-2000:]}")
 
 
-def measured(scene: Path, backend: str, steps: list[str], package: Path, folder: Path) -> dict:
+def measured(scene: Path, backend: str, steps: list[str], package: Path, folder: Path, script: Path = COLD) -> dict:
     """What the script noted, by step."""
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as caches:
@@ -63,7 +65,7 @@ def measured(scene: Path, backend: str, steps: list[str], package: Path, folder:
         install = ("--command", "extension", "install-file", "--repo", "user_default", "--enable", package)
         blender(empty, folder / "install.log", *install)
         shown = ("--gpu-backend", backend, "--window-geometry", "0", "0", "1280", "800", scene)
-        blender(empty, folder / "blender.log", *shown, "--python", SCRIPT, "--", *steps, folder)
+        blender(empty, folder / "blender.log", *shown, "--python", script, "--", *steps, folder)
     return json.loads((folder / "result.json").read_text())
 
 
@@ -82,6 +84,20 @@ def rows_of(scene: str, backend: str, found: dict) -> list[tuple[str, ...]]:
     ]  # fmt: skip
 
 
+def rows_of_motion(scene: str, backend: str, found: dict) -> list[tuple[str, ...]]:
+    def pixels(one: dict) -> str:
+        return ", ".join("1" if scale == 1 else f"1/{scale}" for scale in one["scales"])
+
+    return [
+        (
+            scene, backend, engine, f"{one['orbit']['steps_per_s']:.1f}", pixels(one["orbit"]),
+            f"{one['playback']['frames_per_s']:.1f}", pixels(one["playback"]),
+        )
+        for engine, one in found.items()
+        if engine in ("candela", "eevee") and "orbit" in one
+    ]  # fmt: skip
+
+
 # ------------------------------------------------------------------------------------------------------------- command
 
 
@@ -89,6 +105,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", default=SCENES, metavar="NAME", help="scenes, as of `bench beside`")
     parser.add_argument("--backend", nargs="+", default=["opengl"], choices=("opengl", "vulkan"))
     parser.add_argument("--steps", nargs="+", default=list(STEPS), choices=STEPS)
+    parser.add_argument("--motion", action="store_true", help="a turning view and playback, beside EEVEE, instead")
     parser.add_argument("--package", type=Path, help="the extension's zip; by default the newest of build/")
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "cold", help="for logs and pictures")
 
@@ -104,11 +121,12 @@ def command(options: argparse.Namespace) -> int:
         for backend in options.backend:
             for scene in scenes_of(list(options.only)):
                 folder = options.output / f"{scene.stem}-{backend}"
-                found = measured(scene, backend, list(options.steps), package, folder)
+                steps, script = ([], MOTION) if options.motion else (list(options.steps), COLD)
+                found = measured(scene, backend, steps, package, folder, script)
                 if "error" in found:
                     print(scene.stem, backend, found["error"], file=terminal, flush=True)
-                for row in rows_of(scene.stem, backend, found):
+                for row in (rows_of_motion if options.motion else rows_of)(scene.stem, backend, found):
                     rows.append(row)
                     print(*row, sep=" | ", file=terminal, flush=True)
-    print(markdown.table([HEAD, *rows]))
+    print(markdown.table([MOVING if options.motion else HEAD, *rows]))
     return 0

@@ -267,6 +267,25 @@ def test_opengl_and_vulkan_render_the_same_picture(installed):
 
 
 @pytest.fixture(scope="module", params=BACKENDS)
+def played(request, installed):
+    return run_script(request.param, "motion")
+
+
+def test_a_moving_block_is_seen_in_playback_as_by_eevee(played):
+    """In the first picture of each frame it is red where it stands, and nowhere it has stood."""
+    folder, result = played
+    assert result.get("error") is None
+    assert not complaints(folder)
+    for engine in ("candela", "eevee"):
+        seen = [pixels(folder / f"{engine}_{frame}.png") for frame in (5, 10, 15)]
+        for k, (x, y) in enumerate(result[engine]["places"]):
+            around = [one[int(y) - 4 : int(y) + 5, int(x) - 4 : int(x) + 5].mean(axis=(0, 1)) for one in seen]
+            red = [one[0] - max(one[1], one[2]) for one in around]
+            assert red[k] > 25 and all(red[k] > 2 * other for j, other in enumerate(red) if j != k), (engine, k, red)
+        assert result[engine]["playback"]["frames_per_s"] > 0 and result[engine]["orbit"]["steps_per_s"] > 0
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
 def passed(request, installed):
     """The pass tree of one backend."""
     return run_script(request.param, "passes")
