@@ -43,6 +43,7 @@ from ..snapshot.scene import NO_LINKS, Snapshot
 VARIABLE = "CANDELA_AHEAD"  # 0: never by a second process
 BACKENDS = ("OPENGL", "VULKAN")  # whose drivers keep programs for other processes
 SILENT_S = 90.0  # after which the process is given up: the largest programs take a third of it on slow machines
+TURN_S = 5.0  # for which a viewport that has not asked again keeps its turn
 MOST_BYTES = 512 << 20  # of a scene that is handed over
 MOST_KNOWN = 4096
 WORKER = Path(__file__).with_name("ahead_worker.py")
@@ -56,10 +57,12 @@ class Job:
 
     number: int
     needs: frozenset[str]
+    asker: int  # whose picture it is
     left: int = 1  # programs that it still has to compile, as far as known
     at: str = ""  # the technique whose programs it compiles, where it meets them while it draws
     compiled: int = 0
     told_at: float = field(default_factory=time.monotonic)
+    asked_at: float = field(default_factory=time.monotonic)
     done: set[str] = field(default_factory=set)  # of DRAFT, FULL
 
 
@@ -85,10 +88,15 @@ class Ahead:
         self._hear()
         if {f"{one} {stage}" for one in needs} <= self._remembered():
             return None
-        if self._job is None or self._job.needs != needs:
-            self._begin(needs, whole, settings)
-        elif stage in self._job.done:
-            return None
+        job, now = self._job, time.monotonic()
+        if job is not None and job.needs == needs:
+            job.asked_at = now
+            if stage in job.done:
+                return None
+        elif job is not None and job.asker != id(renderer) and FULL not in job.done and now - job.asked_at < TURN_S:
+            return 1  # another viewport's comes first
+        else:
+            self._begin(needs, id(renderer), whole, settings)
         if self._job is not None and time.monotonic() - self._job.told_at > SILENT_S:
             self._give_up()
         return None if self.failed else max(self._job.left, 1)
@@ -109,9 +117,9 @@ class Ahead:
             return f"Compiling shaders for {job.at} ({job.compiled} so far)"
         return f"Compiling shaders ({job.left} remaining)"
 
-    def _begin(self, needs: frozenset[str], whole: Snapshot, settings: Settings) -> None:
+    def _begin(self, needs: frozenset[str], asker: int, whole: Snapshot, settings: Settings) -> None:
         self._jobs += 1
-        self._job = Job(self._jobs, needs)
+        self._job = Job(self._jobs, needs, asker)
         order = {"number": self._jobs, "snapshot": whole, "settings": settings}
         buffers: list[pickle.PickleBuffer] = []
         try:

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -101,6 +102,25 @@ def test_another_process_draws_and_is_remembered(region, own_folder):
     again.rest()  # nothing is waited for
     assert other._process is None
     again.viewport.release()
+
+
+def test_two_viewports_do_not_take_the_other_process_from_each_other(region, own_folder, monkeypatch):
+    begun = []
+    monkeypatch.setattr(Ahead, "_start", lambda self: begun.append(self._job.number))
+    monkeypatch.setattr(ahead, "_send", lambda *_: None)
+    region.rest()
+    viewport = region.viewport
+    other, settings = Ahead(), viewport.frame.settings
+    seen = viewport.frame.snapshot
+    lit = replace(seen, lights=tuple(replace(one, kind="SPOT") for one in seen.lights))
+    second = type("Renderer", (), {"materials": viewport.renderer.materials, "geometry": viewport.renderer.geometry})()
+    for _ in range(3):
+        assert other.left(viewport.renderer, seen, settings, True) == 1
+        assert other.left(second, lit, settings, True) == 1
+    assert begun == [1]
+    other._job.asked_at -= 2 * ahead.TURN_S
+    other.left(second, lit, settings, True)
+    assert begun == [1, 2]
 
 
 def test_process_that_ends_is_done_without(region, own_folder, monkeypatch):
