@@ -47,6 +47,7 @@ def test_an_emissive_square_has_the_caustic_of_an_area_lamp(stage):
     assert images["diffuse_direct"][15:17, 15:17, 0].max() == 0.0
 
 
+@pytest.mark.slow
 def test_the_bright_part_of_the_world_has_the_light_of_the_ball_lens(stage):
     stage.floor()
     arriving = world_with_a_bright_zenith(stage)
