@@ -20,6 +20,14 @@ struct Bins {
   vec3 emitted;           // radiance that media before the end send to the start
 };
 
+// Of a grid, scattering is known at one cell that was drawn, extinction as a mean along the bin.
+#ifdef MEDIA_GRIDS
+#define LEAST_ALBEDO 0.3
+#define EVEN_SHARE 0.1  // of the weights, given to all bins alike: cells that were not drawn may scatter, too
+#else
+#define LEAST_ALBEDO 1e-3
+#endif
+
 // The ray that was asked for last. Not a parameter: compilers copy arrays for each call, and take long over it.
 Bins bins;
 
@@ -161,7 +169,7 @@ void bins_add(uint inside, vec3 origin, vec3 direction, float from, float to, in
   bins.media[k] = inside;
   bins.extinction[k] = extinction;
   bins.left[k] = bins.end;
-  vec3 sent = bins.end * reach * max(scattering, vec3(1e-3) * extinction);
+  vec3 sent = bins.end * reach * max(scattering, vec3(LEAST_ALBEDO) * extinction);
   float weight = dot(sent, vec3(1.0 / 3.0));
   bins.total += (is_finite(weight) && max_component(scattering + extinction) > 0.0) ? max(weight, 0.0) : 0.0;
   bins.weight[k] = bins.total;
@@ -218,6 +226,13 @@ void media_bins(vec3 origin, vec3 direction, float limit, inout uint seed)
     inside = media_behind(i, inside);
     from = to;
   }
+#ifdef MEDIA_GRIDS
+  float each = EVEN_SHARE * bins.total / float(max(bins.count, 1));
+  for (int i = 0; i < bins.count; i++) {
+    bins.weight[i] += each * float(i + 1);
+  }
+  bins.total += each * float(bins.count);
+#endif
 }
 
 int bins_find(float t)

@@ -2,6 +2,7 @@
 // lost on the way to the places: where it peaks, by few places at even steps. What spreads light over pixels (spread.frag.glsl) divides by it.
 //
 // All pixels draw the same numbers, so that what the grids' cells make of them cancels in that.
+#define MEDIA_TURNS_APART
 #include "media/asking.glsl"
 #include "media/view_ray.glsl"
 

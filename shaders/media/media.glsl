@@ -103,7 +103,12 @@ vec3 medium_grid_depth(int medium, vec3 origin, vec3 direction, float from, floa
   way *= step_length;
   vec3 sum = vec3(0.0);
   for (int i = 0; i < int(steps); i++) {
-    ivec3 at = ivec3(clamp(floor(start + float(i) * way), vec3(0.0), vec3(last)));
+    vec3 place = start + float(i) * way;
+#ifdef MEDIA_TURNS_APART
+    // Each step shifts the grid by itself: the mean over them is smooth, which a guide has to be.
+    place += fract(media_turn.xyz + float(i + 1) * vec3(0.8191725, 0.6710436, 0.5497005)) - media_turn.xyz;
+#endif
+    ivec3 at = ivec3(clamp(floor(place), vec3(0.0), vec3(last)));
     int index = (at.z * (last.y + 1) + at.y) * (last.x + 1) + at.x;
     sum += media_table_fetch(ivec2(index & 2047, int(layout_.w) + (index >> 11))).rgb;
   }

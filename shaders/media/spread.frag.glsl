@@ -7,6 +7,7 @@
 #include "media/view_ray.glsl"
 
 #define REACH 2.0
+#define MOST_TIMES 8.0  // what is known around: more is a guide that has missed it there, at the rim of a cloud
 
 float overlap(float place, float middle)
 {
@@ -31,6 +32,7 @@ void main()
   float known_opacity = 0.0;
   vec3 guided = vec3(0.0);
   vec3 guides = vec3(0.0);
+  vec3 most = vec3(0.0);
   vec3 here = airlight_guide_fetch(pixel).rgb;
   ivec2 last = airlight_guide_size() - 1;
   for (int y = -2; y <= 2; y++) {
@@ -51,6 +53,7 @@ void main()
       vec3 trust = weight / max(there + here, vec3(1e-20));
       guided += trust * found.rgb;
       guides += trust * there;
+      most = max(most, (weight > 0.0) ? abs(found.rgb) : vec3(0.0));
       total += weight;
     }
   }
@@ -58,7 +61,8 @@ void main()
   // What no place of the guide has met stays where it is.
   ivec2 nearest = clamp(ivec2(floor(middle + 0.5)), ivec2(0), size - 1);
   vec3 stays = coarse_direct_fetch(nearest).rgb * opacity / max(coarse_emission_fetch(nearest).w, 1e-30);
-  out_direct = vec4(mix(stays, guided * here / max(guides, vec3(1e-30)), greaterThan(guides, vec3(0.0))), 0.0);
+  vec3 spread = mix(stays, guided * here / max(guides, vec3(1e-30)), greaterThan(guides, vec3(0.0)));
+  out_direct = vec4(clamp(spread, -MOST_TIMES * most, MOST_TIMES * most), 0.0);
   // Thin fire hides nothing and still shines.
   float evenly = 1.0 / max(total, 1e-30);
   out_emission = vec4(emission.rgb * ((opacity > 1e-3) ? share : evenly), 0.0);
