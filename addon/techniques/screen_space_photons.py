@@ -38,7 +38,7 @@ from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters
 from ..lighting.caustic_maps import SEEN, CausticMaps
-from ..lighting.photons import FOOTPRINTS, PHOTONS, LitView, Photons
+from ..lighting.photons import FOOTPRINTS, PHOTONS, SPREAD_SIDE, LitView, Photons
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.panorama import bends_lines
@@ -101,6 +101,8 @@ class ScreenSpacePhotons(Technique):
         self._casters = caustic_casters.of(frame)
         if self._casters is not None:
             self._photons.begin(frame, self._casters)
+            if self._casters.spreads:
+                frame.chose(self, "photons", f"{SPREAD_SIDE} x {SPREAD_SIDE}, because nothing makes light converge")
             at_once = self._photons.all_at_once(frame, self._casters)
             self._turns.begin(frame, ("radiance.diffuse_indirect",), at_once)
 

@@ -12,15 +12,15 @@ void main()
     if (y == place.y) {
       continue;
     }
+    // Bisection in as many steps for all, LIST_COLUMNS a power of two: no lane waits for another one.
+    bool first = y < place.y;
     int low = 0;
-    int high = LIST_COLUMNS;
-    while (low < high) {
-      int middle = (low + high) / 2;
-      uint other = row_keys_fetch(ivec2(middle, y)).x;
-      bool earlier = other < key || (other == key && y < place.y);
-      low = earlier ? middle + 1 : low;
-      high = earlier ? high : middle;
+    for (int half_width = LIST_COLUMNS / 2; half_width > 0; half_width /= 2) {
+      uint other = row_keys_fetch(ivec2(low + half_width - 1, y)).x;
+      low += (other < key || (first && other == key)) ? half_width : 0;
     }
+    uint last = row_keys_fetch(ivec2(low, y)).x;  // low < LIST_COLUMNS, since the steps sum up to one less
+    low += (last < key || (first && last == key)) ? 1 : 0;
     before += low;
   }
   ivec2 target_place = ivec2(before % LIST_COLUMNS, before / LIST_COLUMNS);
