@@ -1,8 +1,8 @@
 """Drafts of a moving view with history and without: `python -m bench orbit`.
 
 A camera goes around, an object moves, a lamp moves, or its power is edited in the middle; each for so many steps. Each
-step is one draft, as the viewport draws it (one sample, draft parameters), and is compared with its own converged
-picture: the same film, full parameters, many samples.
+step is one draft, as the viewport draws it (one sample, draft parameters), and one of every few is compared with its
+own converged picture: the same film, full parameters, many samples.
 
     error           mean over steps of relMSE (bench/moving.py) on what is seen, ended at 1 for a pixel
     fresh           the same where history holds nothing: what came into view, edges, what has moved away
@@ -37,6 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="+", default=["cornell_box"], help="sample files, or paths of .blend files")
     parser.add_argument("--ways", nargs="+", default=list(WAYS), choices=WAYS)
     parser.add_argument("--steps", type=int, default=48)
+    parser.add_argument("--every", type=int, default=4, help="of so many steps one is compared")
     parser.add_argument("--size", default="96x72", help="pixels of the draft")
     parser.add_argument("--truth", type=int, default=64, help="samples of a converged picture")
     parser.add_argument("--page", action="store_true", help=f"write the table into docs/{PAGE.name}")
@@ -65,14 +66,17 @@ def row_of(name: str, way: str, options: argparse.Namespace) -> tuple[str, ...]:
     bpy.ops.wm.open_mainfile(filepath=str(path))
     size = tuple(int(edge) for edge in options.size.split("x"))
     steps = Steps(bpy.context.scene, way, options.steps, size)
-    truths = [steps.truth(number, options.truth) for number in range(options.steps)]
+    edit = options.steps // 2
+    measured = range(edit, edit + AFTER) if way == "edit" else range(1, options.steps, options.every)
+    truths = [steps.truth(number, options.truth) for number in measured]
     without, _, slow = steps.drawn(False)
     with_history, fresh, quick = steps.drawn(True)
-    seen = [errors(shown, truth) for shown, truth in zip(without, truths)]
-    better = [errors(shown, truth) for shown, truth in zip(with_history, truths)]
-    counted = slice(options.steps // 2, options.steps // 2 + AFTER) if way == "edit" else slice(1, None)
-    before, after = (float(np.mean(found[counted])) for found in (seen, better))
-    new = [float(np.mean([e[m].mean() for e, m in zip(found[1:], fresh[1:]) if m.any()])) for found in (seen, better)]
+    seen, better = (
+        [errors(shown[k], truth) for k, truth in zip(measured, truths)] for shown in (without, with_history)
+    )
+    before, after = float(np.mean(seen)), float(np.mean(better))
+    masks = [fresh[k] for k in measured]
+    new = [float(np.mean([e[m].mean() for e, m in zip(found, masks) if m.any()] or [0.0])) for found in (seen, better)]
     return (
         path.stem.replace("_", " "), "lamp's power, 3 steps after" if way == "edit" else way, f"{before:.4f}",
         f"{after:.4f}", f"{after / before:.2f}", f"{new[0]:.4f}", f"{new[1]:.4f}", f"{slow:.2f}", f"{quick:.2f}",

@@ -2,10 +2,11 @@
 side.
 
 Space is cut into cells whose sides grow with the distance from the camera in steps of sqrt(2), such that a picture of
-surfaces that face it shows FACTOR^-2 of them for each probe. A grid of pixels, shifted in every sample, says which
-cells are seen. Each has a random number of its own; in a sample those with the lowest ones have a probe: the pixel
-that is nearest to a point of the cell, which follows the sample's numbers. Where a camera moves a little, a cell that
-comes into view or leaves it exchanges one probe, and the others keep place, number and directions.
+surfaces that face it shows FACTOR^-2 of them for each probe; surfaces that face another of six ways are other cells. A
+grid of pixels, shifted in every sample, says which cells are seen. Each has a random number of its own; in a sample
+those with the lowest ones have a probe: on the surface below a point of the cell, the first one of eight below which
+the picture shows the surface; the first one follows the sample's numbers. Where a camera moves a little, a cell that
+comes into view or leaves it exchanges one probe, and nine of ten others keep place, number and directions.
 
 | pass | work for N pixels of the grid, P probes |
 |---|---|
