@@ -6,7 +6,7 @@ surfaces that face it shows FACTOR^-2 of them for each probe; surfaces that face
 grid of pixels, shifted in every sample, says which cells are seen. Each has a random number of its own; in a sample
 those with the lowest ones have a probe: on the surface below a point of the cell, the first one of eight below which
 the picture shows the surface; the first one follows the sample's numbers. Where a camera moves a little, a cell that
-comes into view or leaves it exchanges one probe, and nine of ten others keep place, number and directions.
+comes into view or leaves it exchanges one probe, and most others keep place, number and directions.
 
 | pass | work for N pixels of the grid, P probes |
 |---|---|
