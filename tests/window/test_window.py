@@ -272,7 +272,7 @@ def played(request, installed):
 
 
 def test_a_moving_block_is_seen_in_playback_as_by_eevee(played):
-    """In the first picture of each frame it is red where it stands, and nowhere it has stood."""
+    """In the first picture of each frame it is red where it stands, and less where it has stood, before warm stone."""
     folder, result = played
     assert result.get("error") is None
     assert not complaints(folder)
@@ -281,7 +281,7 @@ def test_a_moving_block_is_seen_in_playback_as_by_eevee(played):
         for k, (x, y) in enumerate(result[engine]["places"]):
             around = [one[int(y) - 4 : int(y) + 5, int(x) - 4 : int(x) + 5].mean(axis=(0, 1)) for one in seen]
             red = [one[0] - max(one[1], one[2]) for one in around]
-            assert red[k] > 25 and all(red[k] > 2 * other for j, other in enumerate(red) if j != k), (engine, k, red)
+            assert red[k] > 60 and all(red[k] > 1.5 * other for j, other in enumerate(red) if j != k), (engine, k, red)
         assert result[engine]["playback"]["frames_per_s"] > 0 and result[engine]["orbit"]["steps_per_s"] > 0
 
 
