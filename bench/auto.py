@@ -123,6 +123,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="*", default=[], metavar="NAME")
     parser.add_argument("--slots", nargs="*", default=[*SLOTS], choices=[*SLOTS])
     parser.add_argument("--samples", nargs="*", type=int, default=[1, 4])
+    parser.add_argument("--leave-out", nargs="*", default=[], metavar="NAME", help="techniques that are not measured")
     parser.add_argument("--anew", action="store_true", help="measure again what is known")
     parser.add_argument(
         "--only-auto", action="store_true", help="ask anew what Auto takes; techniques stay as measured"
@@ -162,6 +163,8 @@ def _measure(name: str, options: argparse.Namespace, results: dict) -> None:
     if not wanted:
         return
     scene = build(name)
+    lit = any(thing.type == "LIGHT" for thing in scene.objects)
+    wanted = [(slot, n) for slot, n in wanted if slot != "shadow" or lit]
     truths: dict[str, tuple] = {}
     for slot, samples in wanted:
         if slot not in truths:
@@ -170,7 +173,7 @@ def _measure(name: str, options: argparse.Namespace, results: dict) -> None:
         found = dict(results.get(f"{name}/{slot}/{samples}", {})) if options.only_auto else {}
         slow = _slow(results.get(f"{name}/{slot}/1", {})) if samples > 1 else set()
         for wish in (AUTO, *(() if options.only_auto else techniques(slot))):
-            if wish not in slow:
+            if wish not in slow and wish not in options.leave_out:
                 most = SLOW * found[AUTO]["seconds"] + 2.0 if AUTO in found else math.inf
                 found[wish] = measured(scene, slot, wish, samples, truths[slot], most)
         results[f"{name}/{slot}/{samples}"] = found

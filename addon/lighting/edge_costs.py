@@ -9,7 +9,8 @@ error by edges, rays and maps"). What edges cost follows from how many of them a
 `edge` is measured with the device's other figures (frame/device_probe.py). Edges before a pixel are counted as tiles
 on the GPU count them, by wedges and boxes around the picture's receivers, for at most ASKED of either: a product of
 matrices on the processor. What a light's edges cost is known once its silhouettes are, which few triangles make fast:
-above MOST_TRIANGLES nobody looks. Auto takes edges where they cost a third, as figures of a device are no forecasts.
+above MOST_TRIANGLES nobody looks. Auto takes edges where they cost four fifths, as figures of a device are no
+forecasts: then they take no longer than the filtered maps that it has else (`python -m bench auto`), and err less.
 
 What else would be taken for one sample, a filtered map, costs less than either and errs two to four times as much as
 edges, by an amount that no scene tells beforehand.
@@ -28,7 +29,7 @@ from ..scene.receivers import Receivers
 from .maps_or_rays import Compared
 
 EQUAL = 35  # samples of a ray each: the least that was measured
-GAIN = 3.0
+GAIN = 1.25
 PIXEL = 4.0  # edges' worth of receivers, counts, the mean over points and over neighbours
 PASSES = 8
 OF_CARD = 8.0  # edges' worth of a triangle with alpha, whose opacity every point asks
@@ -101,4 +102,4 @@ def foreseen(pixels: int, triangles: int, others: Compared) -> str:
     most = int(least / (pixels * costs.edge) - PIXEL)
     if most < 1:
         return "soft maps, because edges cost more here than rays or maps with the same error"
-    return f"edges, if at most {most} lie before a pixel, because they then cost a third of equal {others.name} here"
+    return f"edges, if at most {most} lie before a pixel, because they then cost less than equal {others.name} here"

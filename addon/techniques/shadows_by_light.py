@@ -4,7 +4,7 @@
 |---|---|---|
 | without extent | plain | nothing to filter |
 | widest penumbra below one texel of a plain map | plain | filtered or not, the map shows the same |
-| few silhouette edges before each pixel | edges (depth_complexity.py) | a third of the cost of equal rays or maps |
+| few silhouette edges before each pixel | edges (depth_complexity.py) | less than equal rays or maps cost |
 | the `important` strongest of the others | variance (vssm.py) | the least error of one map |
 | all others | convolution (cssm.py) with 2 x 2 boxes and one contact ray | a lookup that costs less |
 

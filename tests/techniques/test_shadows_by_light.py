@@ -141,8 +141,8 @@ def test_edges_that_would_be_many_or_say_too_little_are_left(few_edges, why, mon
     if why == "triangles":
         monkeypatch.setattr(edge_costs, "MOST_TRIANGLES", 3)
     elif why == "cards":
-        for k in range(60):
-            card = few_edges.blocker((-0.4, 0.01 * k), (0.4, 0.01 * k + 0.02), 1.5)
+        for k in range(160):
+            card = few_edges.blocker((-0.4, 0.004 * k), (0.4, 0.004 * k + 0.01), 1.5)
             card.data.materials.clear()
             card.data.materials.append(few_edges.see_through(0.5))
     else:
