@@ -290,5 +290,7 @@ SCENES = ROOMS | OPEN
 
 
 def build(name: str) -> bpy.types.Scene:
-    """The only scene of an empty Blender."""
-    return SCENES[name]().scene
+    """The only scene of an empty Blender, with the usual filter."""
+    scene = SCENES[name]().scene
+    scene.render.filter_size = 1.5
+    return scene

@@ -23,6 +23,7 @@ class Entrant:
     samples: int
     settings: tuple[tuple[str, object], ...] = ()
     made_by: Callable[[str], None] | None = None  # instead of the strip's own
+    shows: str = ""  # an image of the frame in place of the picture
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,30 @@ def _for_eevee(_: str) -> None:
     scenes.background().inputs["Color"].default_value = (0.15, 0.18, 0.24, 1)
 
 
+def _edits(name: str) -> None:
+    from bench import shown_scenes
+
+    shown_scenes.edits(name)
+
+
+def _unedited(name: str) -> None:
+    from bench import shown_scenes
+
+    shown_scenes.edits(name, edited=False)
+
+
+def _sun(name: str) -> None:
+    from bench import shown_scenes
+
+    shown_scenes.sun(name)
+
+
+def _sheet(name: str) -> None:
+    from bench import shown_scenes
+
+    shown_scenes.sheet(name)
+
+
 NO_BOUNCES = ("slot_indirect", "OFF")
 CYCLES = Entrant("CYCLES", 128)
 STRIPS = {
@@ -164,6 +189,33 @@ STRIPS = {
             Entrant("CANDELA", 8, (NO_BOUNCES, ("slot_caustics", "screen_space_photons"))),
             CYCLES,
         ),
+    ),
+    "edits": Strip(
+        (128, 96),
+        ("head", "in a mirror", "glass ball"),
+        _edits,
+        (
+            Entrant("CANDELA", 16, (("edit_heat_shown", True),), shows="film.turned"),
+            Entrant("CANDELA", 16, made_by=_unedited),
+            Entrant("CANDELA", 16),
+        ),
+    ),
+    "sun": Strip(
+        (192, 128),
+        ("sun", "lamp", "pupil of 3 mm"),
+        _sun,
+        (Entrant("CANDELA", 4, (NO_BOUNCES,), shows="film.lens"), Entrant("CANDELA", 4, (NO_BOUNCES,))),
+    ),
+    "sheet": Strip(
+        (128, 96),
+        ("sheet", "panes"),
+        _sheet,
+        (
+            Entrant("CANDELA", 4, (NO_BOUNCES, ("slot_shadow", "penumbra_wedges"))),
+            Entrant("CANDELA", 4, (NO_BOUNCES, ("slot_shadow", "depth_complexity"))),
+            CYCLES,
+        ),
+        bounces=0,
     ),
     "grass_flight": Strip(
         (128, 96),
@@ -254,7 +306,7 @@ def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarra
         for key, value in one.settings:
             setattr(settings, key, value)
         found = render_passes(bpy.context.scene, one.engine, one.samples, 1, size=strip.size, bounces=strip.bounces)
-        pictures.append(found.images["combined"][..., :3])
+        pictures.append(_of_frame(one.shows) if one.shows else found.images["combined"][..., :3])
     if exposure is None:
         exposure = float(-np.log2(max(np.percentile(pictures[-1], 97), 1e-6)))
     width, height = strip.size
@@ -271,3 +323,14 @@ def write_picture(path: Path, shown: np.ndarray) -> None:
 
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(png((np.clip(shown[:, :-GAP], 0, 1) * 255 + 0.5).astype(np.uint8)))
+
+
+def _of_frame(name: str) -> np.ndarray:
+    """An image of the frame that was rendered last, (H, W, 3)."""
+    import bpy
+
+    from addon import engine
+    from addon.gfx import images
+
+    frame = engine.session(bpy.context.scene, "final").renderer.frame
+    return images.read(frame.images[name])[..., :3]
