@@ -422,6 +422,41 @@ def reflections(left, right):
     press("ESC", x, y, "RELEASE")
     yield 0.3
     result["after_escape"] = len(constraints())
+    yield from bound_reflections(left, scene, lamp, constraints()[0])
+
+
+def bound_reflections(left, scene, lamp, first):
+    """The first target goes with the lamp, which is moved by G and keyframed; the heat map; and a mirror of it all."""
+    mirror = window().view_layer.objects.active
+    scene.frame_set(1)
+    mirror.animation_data_clear()
+    first.target_object = lamp
+    lamp.keyframe_insert("location", frame=1)
+    activate(lamp)
+    before = lamp.location.copy()
+    with there(left):
+        result["moved"] = list(bpy.ops.transform.translate("EXEC_DEFAULT", value=(-3.0, 0.5, -1.5)))
+    lamp.keyframe_insert("location", frame=10)
+    result["lamp_moved"] = (lamp.location - before).length
+    for frame in (1, 10):
+        scene.frame_set(frame)
+        yield from f12(f"reflections_lamp_{frame}")
+    activate(mirror)
+    scene.candela.edit_heat_shown = True
+    yield from wait_for_rest()
+    yield 0.5
+    picture("reflections_heat.png")
+    scene.candela.edit_heat_shown = False
+    camera = scene.camera
+    camera.rotation_euler.rotate_axis("Y", math.pi)  # away from the mirror, into another one
+    shape(
+        "plane", mirror.active_material, size=6.0, location=(0.0, -7.0, 1.6), rotation=(-math.radians(90.0), 0.0, 0.0)
+    )
+    yield from f12("reflections_mirrored")
+    for one in mirror.candela.reflection_editing_constraints:
+        one.enabled = False
+    mirror.update_tag()
+    yield from f12("reflections_mirrored_without")
 
 
 def grass(left, right):

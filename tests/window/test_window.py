@@ -435,6 +435,16 @@ def test_a_second_constraint_moves_a_highlight_and_keeps_the_first(tried):
     assert after[around].mean() > before[around].mean() + 30
 
 
+def test_a_reflections_target_goes_with_a_lamp_and_mirrors_show_it(tried):
+    folder, result = tried
+    assert result["moved"] == ["FINISHED"] and result["lamp_moved"] > 2.0
+    names = ("lamp_1", "lamp_10", "mirrored", "mirrored_without")
+    shown = {name: pixels(folder / f"reflections_{name}_render.png").astype(float) for name in names}
+    assert np.abs(shown["lamp_1"] - shown["lamp_10"]).max() > 30
+    assert np.abs(shown["mirrored"] - shown["mirrored_without"]).max() > 30
+    assert (folder / "reflections_heat.png").exists()
+
+
 def test_translucency_is_painted_undone_and_saved(tried):
     _, result = tried
     assert result["new_maps"] == result["paint"] == ["FINISHED"]
