@@ -217,7 +217,8 @@ class Photons:
             if turn is not None and count > 1:
                 # Sample 0 has its photons before it is known how many others do: those are a set without it.
                 index, sharing, of_turns = max(index - 1, 0), count - (index > 0), frame.settings.samples
-            parts = _points(emitter, boxes, sharing * (MOST_POINTS if casters.spreads else 1))
+            parts = _points(emitter, boxes, sharing)
+            parts = min(parts, max(MOST_POINTS // sharing, 1)) if casters.spreads else parts
             strata = sharing * parts if whole else 0  # 1: see _drawn
             strata = -1 if of_turns and sharing == count else strata
             grid, least = (min(side, one) for one in ((SPREAD_SIDE, 32) if casters.spreads else (side, LEAST_SIDE)))
