@@ -19,7 +19,9 @@ void main()
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 41).x;
   vec3 through = exp(-min(around_eye.rgb * ray.limit, vec3(1e30)));
+#ifdef MEDIA_OF_CAMERA  // there are media, not only what a solid absorbs
   media_asked_by(MEDIA_OF_CAMERA);
+#endif
   through *= media_transmittance(ray.origin, ray.direction, ray.limit, salt);
   out_through = vec4(through, ray.hit ? 1.0 : 0.0);
 }
