@@ -63,6 +63,7 @@ CHOICE = 4  # candidates at least, for each virtual light that is kept
 NEAR = 0.1  # the bound of 128 virtual lights, in median distances of what is seen
 LAMP_POINTS = 16  # on all lamps, which the paths of a sample look for
 OTHER_POINTS = (32, 24)  # of emissive surfaces and of the world: of one of them, or of each of both
+ONLY_POINTS = lights.MOST_LIGHTS - LAMP_POINTS  # of one of them in the only sample of a picture
 
 PATH_TEXTURES = (
     *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES, ("RGBA32F", "energy_table"), ("RGBA32F", "reflectance"),
@@ -278,7 +279,9 @@ class VirtualLights:
         """Points of this sample on lights, emissive surfaces and the world."""
         rows = self._light_rows(frame, LAMP_POINTS) if self._emitters else []
         seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
-        share = OTHER_POINTS[self._emissive is not None and bool(self._world)]
+        both = self._emissive is not None and bool(self._world)
+        is_only = frame.settings.whole and frame.settings.samples == 1
+        share = ONLY_POINTS if is_only and not both else OTHER_POINTS[both]
         total = share * frame.settings.samples
         numbers = range(frame.sample * share, (frame.sample + 1) * share)
         if self._emissive is not None:
