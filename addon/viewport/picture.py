@@ -64,6 +64,7 @@ class Viewport:
         self.renderer = Renderer(techniques.make_registry)
         self.ahead: Ahead | None = None  # who compiles programs elsewhere, before a picture is begun here
         self.held = False  # the picture waits for that
+        self.was_whole = False  # a sample in full resolution has been shown
         self.looked_after = False  # a timer looks when that has come
         self.cache = SnapshotCache()
         self.pace = Pace()
@@ -255,6 +256,7 @@ class Viewport:
         else:
             one_pass.draw(frame, self.render_pass, self._target)
         self._shown_with, self.looks = frame.shown_with, False
+        self.was_whole |= self.scale == 1
         self._refined = self._with_shapes(frame) if self.scale > 1 else None
         film = frame.snapshot.film
         x, y = self._size[0] / film.width, self._size[1] / film.height
@@ -371,7 +373,10 @@ class Viewport:
         )
         whole, settings = replace(self._snapshot, camera=camera, film=film), replace(settings, shows=asked)
         self.held = False
-        if self.ahead is not None:
+        # An edit rarely needs many programs: they are compiled here, one a redraw, beside the picture of before.
+        if self.ahead is not None and self.was_whole:
+            self.renderer.waits = lambda *_: None
+        elif self.ahead is not None:
             self.renderer.waits = lambda _, drawn: self._waits_for(whole, settings, drawn.draft)
         drawn = drawn_with(settings, scale, scale == 1 or why == CLIMBS)
         parts = self.renderer.beginning(replace(whole, film=coarser(film, scale)), drawn)

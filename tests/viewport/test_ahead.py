@@ -56,14 +56,14 @@ def test_view_shows_a_first_look_then_a_draft_then_all_as_the_other_process_gets
     free.viewport.release()
 
 
-def test_what_was_shown_stays_while_an_edit_waits(region):
-    before = region.rest()
-    region.viewport.ahead = Slow()
+def test_an_edit_does_not_wait_for_another_process(region):
+    """Its programs are few: compiled here they are there sooner than a second Blender has read the scene."""
+    region.rest()
+    region.viewport.ahead = other = Slow()
     bpy.context.scene.objects["Point"].data.type = "SUN"
     region.viewport.dirty = True
-    shown = images.read(region.draw())
-    assert region.viewport.held and not region.viewport.looks
-    assert np.array_equal(shown, before)
+    region.rest()
+    assert not other.asked and not region.viewport.held
 
 
 def needs(region):
