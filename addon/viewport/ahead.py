@@ -2,9 +2,9 @@
 
 Blender's `gpu` module compiles where it is asked, and all of Blender waits; its own compile workers are not offered to
 Python. Drivers keep what they have compiled on disk, for all processes. So before a view's first picture, if nobody is
-known to have compiled its programs, the viewport waits, and shows what it has, while another process draws the same snapshot
-(`ahead_worker.py`): first as a draft, then in full. What is begun then finds its programs in the driver's cache, and
-takes a few hundredths of a second for each.
+known to have compiled its programs, the viewport waits, and shows what it has, while another process draws the same
+snapshot (`ahead_worker.py`): first as a draft, then in full. What is begun then finds its programs in the driver's
+cache, and takes a few hundredths of a second for each.
 
 Which pictures are known is remembered from session to session by digests of what decides about programs: node trees,
 kinds of lamps, features. Where the process cannot be started, ends, or says nothing for long, programs are compiled

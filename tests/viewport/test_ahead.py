@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.gfx import images
 from addon.viewport import ahead
 from addon.viewport.ahead import DRAFT, FULL, Ahead, needs_of
 from tests.viewport.region import Region
