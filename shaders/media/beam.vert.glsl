@@ -39,7 +39,9 @@ void main()
       float nearest = parallel ? 1.0 : max(min(first.w, last.w), 1e-6);
       float own = parallel ? 1.0 : max((corner.x < 0.0) ? first.w : last.w, 1e-6);
       float size = ((beam_end.w > 0.0) ? own : nearest) / scale;
-      float wide = beam_half_width(((corner.x < 0.0) ? from : to) * reach, size) / size + 1.0;
+      // Where the kernel has become as wide as it may before the far end, straight edges from end to end would cut it.
+      bool bounded = beam_flux.w + beam_end.w * to * reach > beam_most_pixels * SPREAD_WIDER * size;
+      float wide = beam_half_width(((corner.x < 0.0 && !bounded) ? from : to) * reach, size) / size + 1.0;
       vec2 place = (corner.x < 0.0) ? p - unit * wide * 2.0 / pixels : q + unit * wide * 2.0 / pixels;
       place += corner.y * across * wide * 2.0 / pixels;
       gl_Position = vec4(place, 0.5, 1.0);

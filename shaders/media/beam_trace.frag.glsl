@@ -215,12 +215,11 @@ void main()
       // At the first two interfaces neighbours take numbers far apart, so that each share of them does what it should.
       vec2 lattice = (i == 0) ? vec2(0.7548777, 0.5698403) : vec2(0.8191725, 0.6710436);
       float turn = fract(dot(floor(gl_FragCoord.xy), lattice) + media_random(choice));
-      // What is mirrored there goes to all sides, so that more rays than its share of light are: few would show as streaks,
-      // and are as wide as if they were no more, so that they overlap.
+      // What is mirrored there goes to all sides, so that more rays than its share of light are: few would show as streaks.
       float share = (i < 2) ? max(reflectance, min(MIRRORED_RAYS / rays, MIRRORED_SHARE)) : reflectance;
       bool mirrored = ((i < 2) ? turn : media_random(seed)) < share;
       flux *= mirrored ? reflectance / share : (1.0 - reflectance) / max(1.0 - share, 1e-6);
-      apart *= inversesqrt(max(mirrored ? reflectance : 1.0 - share, 1e-4));
+      apart *= inversesqrt(max(mirrored ? share : 1.0 - share, 1e-4));
       if (mirrored) {
         float half_width = (width + spread * travelled) * apart;
         // What glass mirrors inside goes through a focus and spreads behind it, by less as it is bent before and after.
