@@ -57,6 +57,9 @@ def hit_program(texels: int) -> Program:
     )  # fmt: skip
 
 
+EDIT_HIT = (hit_program(0), hit_program(1))
+
+
 @dataclass
 class EditedObject:
     """An object of the scene with its edits, as hits find them."""
@@ -91,6 +94,8 @@ class EditedObject:
 
 class EditsAtHits(Service):
     """Turns what rays meet, in one picture."""
+
+    name = "edits_at_hits"
 
     def __init__(self, objects: Sequence[EditedObject]):
         self._objects = objects

@@ -36,7 +36,7 @@ from ..lighting import depth_maps
 from ..lighting.caustic_casters import meshes_answered
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.light_rates import EmissivePoints
-from ..lighting.loop import DIRECT_WRITES, light_surfaces
+from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
 from ..lighting.visibility import (
     NO_VIEWS,
     RAY_CONSTANTS,
@@ -69,6 +69,7 @@ MESH_RAYS = Lookup(
     defines=(("OWN_POINTS", "1"), ("CANDIDATE_POINTS", "8")),
     maps=False,
 )
+LIGHTING = lighting(MESH_RAYS, False)
 
 
 class EmissiveLight(Technique):

@@ -13,8 +13,8 @@ from ..ui.passes import RenderPass
 ONE_PASS: Program = passes.fullscreen_program(
     "film one pass",
     "film/one_pass.frag.glsl",
-    textures=(("RGBA32F", "source"), ("RGBA32F", "color")),
-    constants=(("FLOAT", "scale"), ("FLOAT", "color_scale"), ("INT", "channel"), ("INT", "divided")),
+    textures=(("RGBA32F", "source"), ("RGBA32F", "albedo")),
+    constants=(("FLOAT", "scale"), ("FLOAT", "albedo_scale"), ("INT", "channel"), ("INT", "divided")),
     outputs=(("VEC4", "out_color"),),
 )
 
@@ -31,9 +31,9 @@ def draw(frame: Frame, shown: RenderPass, target: images.Target) -> None:
     passes.fullscreen(
         ONE_PASS,
         target,
-        textures={"source": source, "color": frame.to_show(color[0]) if divided else source},
+        textures={"source": source, "albedo": frame.to_show(color[0]) if divided else source},
         constants={
-            "scale": exposure * _scale(frame, name), "color_scale": _scale(frame, color[0]) if divided else 1.0,
+            "scale": exposure * _scale(frame, name), "albedo_scale": _scale(frame, color[0]) if divided else 1.0,
             "channel": shown.first if len(shown.channels) == 1 else -1, "divided": int(divided),
         },
     )  # fmt: skip

@@ -7,18 +7,18 @@ void main()
   vec4 value = source_fetch(pixel) * scale;
   vec3 shown = channel < 0 ? value.rgb : vec3(value[channel]);
   if (divided == 1) {
-    vec3 color = color_fetch(pixel).rgb * color_scale;
+    vec3 own = albedo_fetch(pixel).rgb * albedo_scale;
     vec3 quotient = vec3(0.0);
     float count = 0.0;
     for (int k = 0; k < 3; k++) {
-      if (color[k] != 0.0) {
-        quotient[k] = shown[k] / color[k];
+      if (own[k] != 0.0) {
+        quotient[k] = shown[k] / own[k];
         count += 1.0;
       }
     }
     float mean = (quotient.r + quotient.g + quotient.b) / max(count, 1.0);
     for (int k = 0; k < 3; k++) {
-      if (color[k] == 0.0) {
+      if (own[k] == 0.0) {
         quotient[k] = mean;
       }
     }

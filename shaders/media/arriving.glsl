@@ -20,6 +20,5 @@ vec3 asked_arriving(Asked asked, vec3 position, uint salt)
   if (clear <= 0.0) {
     return vec3(0.0);
   }
-  media_asked_by(MEDIA_OF_SHADOW);
   return asked.found * media_transmittance(position, asked.direction, min(asked.reach, FARTHEST_MEDIUM), salt + 7u);
 }

@@ -20,5 +20,5 @@ void main()
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 161 + ray_number).x;
   media_asked_by(path_is_bent(int(met_path_fetch(pixel).w + 0.5)) ? MEDIA_OF_TRANSMISSION : MEDIA_OF_GLOSSY);
-  out_passed.rgb = media_transmittance(start, direction, limit, salt);
+  out_passed.rgb = media_transmittance_asked(start, direction, limit, salt);
 }

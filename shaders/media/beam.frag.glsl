@@ -49,7 +49,6 @@ void main()
     discard;
   }
   vec3 passing = media_transmittance_known(position, -ray.direction, along_view, seed);
-  media_asked_by(MEDIA_OF_SHADOW);
   uint even = uint(beam_start.w - 0.5);  // see within_media in beam_trace.frag.glsl
   passing *= (even != 0u) ? exp(-min(media_depth(even, beam_start.xyz, direction, 0.0, along_beam), vec3(1e30)))
                           : media_transmittance(beam_start.xyz, direction, along_beam, seed + 1u);

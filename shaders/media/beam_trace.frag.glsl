@@ -38,6 +38,7 @@ bool within_media(inout vec3 from, inout vec3 to, out uint even)
   vec3 way = to - from;
   float reach = length(way);
   way /= max(reach, 1e-30);
+  media_asked_by(MEDIA_OF_SHADOW);
   media_crossings(from, way);
   uint inside = media_at_start();
   float begin = reach;

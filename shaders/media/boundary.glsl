@@ -31,7 +31,7 @@ Crossings crossings;
 #define MEDIA_OF_TRANSMISSION 4
 #define MEDIA_OF_VOLUME 5
 #ifdef MEDIA_APART
-int media_ray = MEDIA_OF_SHADOW;
+int media_ray;  // whoever follows a ray says it before
 uint media_seen;
 #define media_asked_by(kind) media_ray = (kind)
 #else

@@ -158,11 +158,18 @@ vec3 media_transmittance_known(vec3 origin, vec3 direction, float limit, uint sa
   return exp(-min(depth, vec3(1e30)));
 }
 
-// The same of any ray.
-vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
+// The same of any ray of the kind that was asked about last.
+vec3 media_transmittance_asked(vec3 origin, vec3 direction, float limit, uint salt)
 {
 #ifdef MEDIA_BOUNDED
   media_crossings(origin, direction);
 #endif
   return media_transmittance_known(origin, direction, limit, salt);
+}
+
+// The same of any leg of light.
+vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
+{
+  media_asked_by(MEDIA_OF_SHADOW);
+  return media_transmittance_asked(origin, direction, limit, salt);
 }

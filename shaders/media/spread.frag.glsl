@@ -21,7 +21,7 @@ void main()
   ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 45).x;
   media_asked_by(MEDIA_OF_CAMERA);
-  vec3 passing = media_transmittance(ray.origin, ray.direction, ray.limit, salt);
+  vec3 passing = media_transmittance_asked(ray.origin, ray.direction, ray.limit, salt);
   float opacity = 1.0 - dot(passing, vec3(1.0 / 3.0));
   float own = min(ray.limit, 1e18);
   vec2 middle = (vec2(pixel) - vec2(shown_pixel)) / float(stride);

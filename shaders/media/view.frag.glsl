@@ -21,7 +21,7 @@ void main()
   vec3 through = exp(-min(around_eye.rgb * ray.limit, vec3(1e30)));
 #ifdef MEDIA_OF_CAMERA  // there are media, not only what a solid absorbs
   media_asked_by(MEDIA_OF_CAMERA);
+  through *= media_transmittance_asked(ray.origin, ray.direction, ray.limit, salt);
 #endif
-  through *= media_transmittance(ray.origin, ray.direction, ray.limit, salt);
   out_through = vec4(through, ray.hit ? 1.0 : 0.0);
 }

@@ -56,8 +56,10 @@ def labels(mirror):
     """What is shown below the list of constraints."""
     shown = []
     row = SimpleNamespace(operator=lambda *_, **__: None)
-    layout = SimpleNamespace(row=lambda **_: row, label=lambda text, **_: shown.append(text))
-    reflection_operators._draw(SimpleNamespace(layout=layout), SimpleNamespace(object=mirror))
+    layout = SimpleNamespace(
+        row=lambda **_: row, label=lambda text, **_: shown.append(text), prop=lambda *_, **__: None
+    )
+    reflection_operators._draw(SimpleNamespace(layout=layout), SimpleNamespace(object=mirror, scene=bpy.context.scene))
     return shown
 
 
