@@ -105,7 +105,7 @@ def test_the_cone_of_a_soft_spot_light_applies_to_each_ray(floor):
 @pytest.mark.parametrize("spread", [0.0, np.radians(0.1), np.radians(4)])
 def test_an_area_light_of_little_spread_lights_what_lies_before_it_evenly(floor, spread):
     """Power over area, and nothing beside; below one degree as at one, as in Cycles. A board leaves its own shadow."""
-    floor.blocker((0.0, -2), (0.3, 2), 0.5)
+    floor.blocker((0.0, -2), (0.4, 2), 0.5)
     floor.light("AREA", (0, 0, 2), size=2.0, spread=spread, energy=12.0)
     found = irradiance(floor, samples=4)
     x, y = places(SIZE, SPAN)
