@@ -12,6 +12,8 @@ picture; `render --set edit_heat.shown=true --show film.turned` writes the map i
 
 from __future__ import annotations
 
+import weakref
+
 from ..film.resolve import COMBINED
 from ..frame.picture import Frame
 from ..frame.settings import Settings
@@ -50,9 +52,16 @@ class EditHeat(Technique):
             return NOTHING_EDITED
         return bends_lines(snapshot)
 
+    def __init__(self):
+        self._shown: tuple = (lambda: None, 0)  # the frame whose picture is drawn, and of how many samples
+
     def show(self, frame: Frame) -> None:
+        frame.picture = TURNED
+        drawn, samples = self._shown
+        if drawn() is frame and samples == frame.samples_done:
+            return
+        self._shown = weakref.ref(frame), frame.samples_done
         passes.fullscreen(
             HEAT, frame.target(TURNED), textures={"picture": frame.images[COMBINED], "edit": frame.images[EDIT]}
         )
         frame.count(self, "passes")
-        frame.picture = TURNED

@@ -38,6 +38,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting import caustic_maps
+from ..lighting.caustic_casters import bright_world, meshes_answered
 from ..lighting.caustic_maps import CausticMaps
 from ..lighting.interfaces import clear_roughness
 from ..lighting.leaving_light import sending
@@ -133,7 +134,7 @@ def found_program(kinds: int, transmission: bool) -> Program:
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
         constants=(
             ("INT", "light_count"), ("INT", "world_glossy"), ("INT", "world_transmission"), ("FLOAT", "world_samples"),
-            ("VEC4", "emissive"), ("INT", "ray_number"),
+            ("VEC4", "emissive"), ("VEC2", "glass_blocks"), ("INT", "ray_number"),
         ),
         defines=(("LIGHT_KINDS", str(kinds)), *((("TRANSMISSION", "1"),) if transmission else ())),
         outputs=_outputs(transmission, ORDERS),
@@ -381,7 +382,7 @@ class ShadedReflections(Technique, BothWays):
     def _add_found(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
         world = self._sources.world_flags
         emissive = frame.service(EmissivePoints) or EmissivePoints()
-        bound = closure_bindings(closures)
+        bound, bright = closure_bindings(closures), bright_world(frame)
         passes.fullscreen(
             found_program(self._sources.kinds, transmission),
             self._target(transmission, ORDERS, records.target.depth),
@@ -398,6 +399,7 @@ class ShadedReflections(Technique, BothWays):
                 "world_glossy": int(bool(world & lights.GLOSSY_FLAG)),
                 "world_transmission": int(bool(world & lights.TRANSMISSION_FLAG)),
                 "emissive": self._emissive(emissive.power, emissive.count, reach["ray_number"]),
+                "glass_blocks": (float(meshes_answered(frame)), bright.threshold if bright else 1e30),
                 "ray_number": reach["ray_number"],
             },
         )  # fmt: skip

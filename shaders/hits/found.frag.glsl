@@ -24,14 +24,16 @@ float thinned(float travelled, float further)
 }
 
 // What a ray finds before `limit` in lights and the world. `beyond`: behind glass that a lobe's ray has met, where samples
-// of lamps do not reach that glass blocks.
+// of lamps do not reach that glass blocks, nor (`glass_blocks`) points on emissive meshes, where x is 1, and directions of
+// the world of more luminance than y.
 vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, float lobe_density, float travelled, float limit,
                  bool with_world)
 {
   vec3 sum = vec3(0.0);
   if (with_world && limit >= 1e29 && (bent ? world_transmission : world_glossy) != 0) {
     vec3 radiance = environment_radiance(direction);
-    sum += radiance * share_of_ray(lobe_density, world_samples * environment_density(direction));
+    bool asked = !beyond || luminance(radiance) <= glass_blocks.y;
+    sum += radiance * (asked ? share_of_ray(lobe_density, world_samples * environment_density(direction)) : 1.0);
   }
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
@@ -70,15 +72,16 @@ void main()
   vec3 sum = vec3(0.0);
   // A transparent film has a hole where clear glass shows the world: in alpha, how large.
   bool hole = ray_number > 0 && met.w == 0.0 && path_is_clear(code);
+  bool beyond = path_is_bent(code) && path_mirrors(code) > 0;
   if (ray_number > 0) {
-    bool beyond = path_is_bent(code) && path_mirrors(code) > 0;
     sum += light_found(start, along.xyz, path_is_bent(code), beyond, along.w, travelled, limit, !hole);
   }
   if (met.w != 0.0 && along.w >= 0.0) {
     vec2 others = (ray_number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample
     vec3 emission = surface_emission_fetch(pixel).rgb;
     float points = others.y * passed.w / max(others.x, 1e-30) * thinned(travelled, limit);
-    float share = (along.w > 0.0 && others.x > 0.0) ? power_share(along.w, points) : 1.0;
+    bool asked = others.x > 0.0 && !(beyond && glass_blocks.x > 0.0);
+    float share = (along.w > 0.0 && asked) ? power_share(along.w, points) : 1.0;
     sum += emission * share;
   }
   vec4 light = vec4(path.rgb * passed.rgb * sum, hole ? dot(path.rgb, vec3(1.0 / 3.0)) : 0.0);

@@ -108,6 +108,11 @@ def edited(stage):
     region.centre, region.radius = (0.8, 0.0, 0.8), 2.0
 
 
+def edits_shown(stage):
+    edited(stage)
+    stage.scene.candela.edit_heat_shown = True
+
+
 def grassy(stage):
     stage.floor_materials[0].candela.grass_patch = "MEADOW"
 
@@ -126,6 +131,7 @@ WITH = {
     "volume_caustics": foggy,
     "image_space_subsurface": waxen,
     "reflection_editing": edited,
+    "edit_heat": edits_shown,
     "history": remembering,
 }
 
@@ -145,6 +151,7 @@ WITHOUT = {
     "volume_caustics": no_needs,
     "image_space_subsurface": no_needs,
     "reflection_editing": no_needs,
+    "edit_heat": edited,
     "history": no_needs,
     "shaded_reflections": no_gloss,
     "light_probes": nothing_lit,
