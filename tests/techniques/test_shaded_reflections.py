@@ -160,6 +160,9 @@ def test_a_faint_coat_costs_less_than_a_tenth_of_a_mirror(stage):
         stage.world()
         stage.rectangle((-9, -9), (9, 9), material=stage.principled(**values))
         ceiling(stage, stage.diffuse(0.5), half=3.0)
+        stage.light(
+            "AREA", (0, 0, 0.6), turn=(np.pi, 0, 0), size=1.0
+        )  # so that what a sample shows is not all there is
         stage.camera_above()
         stage.render(128, (16, 12), bounces=1)
         passes.append(stage.ledger.row("shaded_reflections").counters["passes"])
