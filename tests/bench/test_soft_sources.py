@@ -23,6 +23,5 @@ def test_one_sample_of_soft_maps_is_nearer_to_the_truth_than_one_of_hard_maps(re
         soft.Entrant("maps", soft.POINTS, soft.BY_MAPS),
     )
     (vssm, soft_share), (cssm, _), (hard, _), (_, share) = soft_sources.measure(source, entrants, SIZE, 64)
-    print("ZZ", vssm, cssm, hard, soft_share, share)
     assert vssm < hard and cssm < hard
     assert share > 0.1 and soft_share > 0.6 * share
