@@ -167,11 +167,11 @@ def test_every_number_of_lights_and_clusters_works(stage, render, params):
 @pytest.mark.parametrize("scale", [1e-3, 1e4])
 def test_light_does_not_depend_on_the_scale_of_the_scene(stage, render, scale):
     corner(stage)
-    unit = render(2, samples=4)
+    unit = render(2, samples=16)
     stage.clear()
     corner(stage, energy=60.0 * scale**2)
     stage.enlarge(scale)
-    assert render(2, samples=4).mean() == pytest.approx(unit.mean(), rel=0.02)
+    assert render(2, samples=16).mean() == pytest.approx(unit.mean(), rel=0.02)
 
 
 @pytest.mark.parametrize("shadows", ["TEXELS", "CONVOLUTION"])

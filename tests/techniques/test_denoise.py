@@ -227,14 +227,14 @@ def test_dark_surroundings_of_a_bright_rim_stay_dark(stage):
         stage.scene.candela.denoise_strength = strength
         return stage.render(samples, (64, 64))["combined"][..., 0].astype(float)
 
-    truth = picture(256, 0.0)
+    truth = picture(1024, 0.0)
     x, y = places((64, 64), 1.6)
     dark = (np.maximum(np.abs(x), np.abs(y)) > 0.3) & (np.maximum(np.abs(x), np.abs(y)) < 0.5)
     denoised = picture(64, 1.0)
     assert denoised[dark].mean() == pytest.approx(truth[dark].mean(), rel=0.2)
     near = np.maximum(np.abs(x), np.abs(y)) < 0.15
     noise = [np.square(one - truth)[near].mean() for one in (denoised, picture(64, 0.0))]
-    assert noise[0] < 0.4 * noise[1]
+    assert noise[0] < 0.5 * noise[1] and noise[0] < 0.01  # 0.036 and 0.12 before pixels had points of their own here
 
 
 def test_the_variance_of_a_level_is_that_of_a_weighted_mean(gpu_context):
