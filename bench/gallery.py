@@ -1,4 +1,4 @@
-"""The gallery of the README: twelve scenes by Candela, Cycles and EEVEE with their times: `python -m bench gallery`.
+"""The gallery of the README: scenes by Candela, Cycles and EEVEE with their times: `python -m bench gallery`.
 
 Each strip shows one scene three times: by Candela with 16 samples, by Cycles with 64 and its denoiser, by EEVEE with 16
 and ray tracing. Seconds are what the process computed, all cores together, for a picture after another of the same
@@ -41,6 +41,7 @@ def _street() -> None:
 
 def _moved_reflection() -> None:
     import bpy
+    import mathutils
 
     from bench import reflection_scenes
 
@@ -48,8 +49,11 @@ def _moved_reflection() -> None:
     mirror = next(thing for thing in bpy.data.objects if "Mirror" in getattr(thing.data, "materials", ()))
     settings = mirror.candela
     edit, region = (getattr(settings, f"reflection_editing_{name}").add() for name in ("constraints", "regions"))
-    edit.point, edit.target, edit.viewer = (0.0, 3.0, 1.3), (-0.8, -3.5, 0.6), (0.4, -1.5, 1.4)
-    region.radius, region.border = 3.0, 0.5
+    into = mirror.matrix_world.inverted()
+    edit.point, edit.viewer, edit.target = (
+        into @ mathutils.Vector(place) for place in ((0.5, 3.0, 1.3), (0.4, -1.5, 1.4), (-0.8, -3.5, 0.6))
+    )
+    region.centre, region.radius, region.border = edit.point, 3.0, 0.5
 
 
 def _medium(name: str) -> Callable[[], None]:
@@ -115,7 +119,7 @@ def _candela(**settings) -> None:
 
 
 GALLERY = {
-    "glare": Shown("Glare of the human eye", "needles, halo and veil computed from pupil, lens and vitreous",
+    "glare": Shown("Glare of the human eye", "needles, halo and veil from a model of pupil, lens and vitreous",
                    "glare.md", _street),
     "reflection": Shown("Reflections you can move", "the yellow ball was dragged into the middle of the mirror",
                         "reflections.md", _moved_reflection),
@@ -133,8 +137,6 @@ GALLERY = {
                    "edge_shadows.md", _edges),
     "indirect": Shown("Bounced light", "a room lit through its window, by virtual lights with soft visibility",
                       "indirect_light.md", _sample("window_interior")),
-    "implicit": Shown("Implicit visibility", "a hall of columns by antiradiance of surfels, without a shadow ray",
-                      "implicit_visibility.md", _sample("colonnade_hall", slot_indirect="implicit_visibility")),
     "panorama": Shown("Panoramic cameras", "fisheye, mirror ball, spherical stereo: every technique sees through them",
                       "panoramas.md", _fisheye),
 }  # fmt: skip
