@@ -35,7 +35,7 @@ FACTOR = 1.3  # side of a cell over that of a probe's share of the picture
 
 _LIST = ordered_lists.DEFINES
 _CELLS = (("IVEC2", "lattice"), ("FLOAT", "cell_share"))
-_PLACES = (("RGBA32F", "surface_position"), ("RGBA32F", "surface_normal"))
+_PLACES = (("RGBA32F", "surface_position"),)
 KEYS = passes.fullscreen_program(
     "keys of probes", "indirect/probe_keys.frag.glsl", textures=_PLACES, blocks=((VIEW, "film_view"),),
     constants=_CELLS, defines=_LIST, outputs=(("UINT", "out_key"),),
@@ -70,7 +70,7 @@ def find(frame: Frame, grid: tuple[int, int], bindings: dict) -> dict[str, image
     found = {name: images.pool.take(grid[0] * grid[1], 1, image_format) for image_format, name in TEXTURES}
     with images.borrowed(*size, "R32UI") as keys, images.borrowed(*size, "RG32F") as first:
         passes.fullscreen(
-            KEYS, keys, textures={name: textures[name] for _, name in _PLACES},
+            KEYS, keys, textures={"surface_position": textures["surface_position"]},
             blocks={"film_view": frame.view_block}, constants=constants,
         )  # fmt: skip
         sorted_keys, order = ordered_lists.take_sorted(keys.colors[0])

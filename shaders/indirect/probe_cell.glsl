@@ -8,27 +8,16 @@
 struct Cell {
   ivec3 place;
   float side;  // m
-  uint facing;  // which of six ways
 };
 
-Cell cell_of(ivec2 pixel)
+Cell cell_of(vec3 position)
 {
-  vec3 position = surface_position_fetch(pixel).xyz;
-  vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
   float picture = view_pixel() * sqrt(film_view.film.x * film_view.film.y);
   float wanted = max(picture * view_growth(position) * cell_share, 1e-12);
   Cell cell;
   cell.side = exp2(0.5 * floor(2.0 * log2(wanted) + 0.5));
   cell.place = ivec3(clamp(floor(position / cell.side + CELL_OFFSET), vec3(-1e9), vec3(1e9)));
-  vec3 along = abs(normal);
-  int axis = (along.x >= along.y && along.x >= along.z) ? 0 : ((along.y >= along.z) ? 1 : 2);
-  cell.facing = uint(2 * axis + ((normal[axis] < 0.0) ? 1 : 0));
   return cell;
-}
-
-bool same_cell(Cell a, Cell b)
-{
-  return a.place == b.place && a.side == b.side && a.facing == b.facing;
 }
 
 // Random bits of a cell: who it is, whatever the picture.
@@ -36,7 +25,7 @@ uvec3 cell_bits(Cell cell)
 {
   uint level = uint(int(floor(2.0 * log2(cell.side) + 0.5)));
   uvec3 bits = hash3(uvec3(cell.place) + uvec3(0u, 0u, level * 0x9E3779B1u));
-  return hash3(bits ^ uvec3(uint(film_view.seed), 91u, cell.facing));
+  return hash3(bits ^ uvec3(uint(film_view.seed), 91u, 0u));
 }
 
 // Pixels among which probes are chosen: a grid of them, shifted in every sample.

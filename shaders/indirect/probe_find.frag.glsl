@@ -9,7 +9,6 @@
 #include "indirect/probe_cell.glsl"
 
 #define MOST_MIRRORS 4  // one behind another, that a probe looks at
-#define TRIALS 8
 #define WIDE_LOBE 0.55  // roughness from which a lobe sends its light about as far around as a virtual light does
 
 struct Probe {
@@ -25,12 +24,19 @@ bool is_metal(vec3 diffuse, vec3 straight)
   return luminance(straight) > luminance(diffuse);
 }
 
-// The pixel of the cell that shows what is nearest to a point in it; the cell's entries in the sorted list begin at `entry`.
-ivec2 nearest_pixel(int entry, Cell cell, vec3 middle)
+// The pixel of a cell, whose entries in the sorted list begin at `entry`, who the cell is, and the point in it to which the
+// pixel is nearest.
+ivec2 pixel_of_cell(int entry, out uint id, out vec3 middle)
 {
   ivec2 at = ivec2(entry % LIST_COLUMNS, entry / LIST_COLUMNS);
   uint key = sorted_keys_fetch(at).x;
   ivec2 best = lattice_pixel(int(sorted_order_fetch(at).x));
+  Cell cell = cell_of(surface_position_fetch(best).xyz);
+  uvec3 bits = cell_bits(cell);
+  id = bits.z;
+  vec3 within = vec3(scrambled(film_view.bits_z, bits.x), scrambled(film_view.bits_w, bits.y),
+                     to_unit(hash3(bits + uint(film_view.sample_index)).x));
+  middle = (vec3(cell.place) - CELL_OFFSET + within) * cell.side;
   float nearest = 1e30;
   for (int i = entry; i < lattice.x * lattice.y; i++) {
     at = ivec2(i % LIST_COLUMNS, i / LIST_COLUMNS);
@@ -50,73 +56,16 @@ ivec2 nearest_pixel(int entry, Cell cell, vec3 middle)
     for (int k = 0; k < 9; k++) {
       ivec2 pixel = clamp(middle_pixel + stride * (ivec2(k % 3, k / 3) - 1), ivec2(0), size - 1);
       vec4 there = surface_position_fetch(pixel);
+      Cell other = cell_of(there.xyz);
       vec3 path = there.xyz - middle;
       float squared = dot(path, path);
-      if (there.w != 0.0 && squared < nearest && same_cell(cell_of(pixel), cell)) {
+      if (there.w != 0.0 && other.place == cell.place && other.side == cell.side && squared < nearest) {
         best = pixel;
         nearest = squared;
       }
     }
   }
   return best;
-}
-
-// Whether a place on the plane that a pixel shows lies between it and pixels beside it that show that plane, too.
-bool between_pixels(ivec2 pixel, vec3 place, vec3 normal)
-{
-  vec3 position = surface_position_fetch(pixel).xyz;
-  vec3 path = place - position;
-  float reach = 0.0;
-  for (int axis = 0; axis < 2; axis++) {
-    ivec2 forth = (axis == 0) ? ivec2(1, 0) : ivec2(0, 1);
-    float farthest = 0.0;
-    for (int side = -1; side < 2; side += 2) {
-      ivec2 other = pixel + side * forth;
-      if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, surface_position_size()))) {
-        continue;
-      }
-      vec4 there = surface_position_fetch(other);
-      vec3 step_to = there.xyz - position;
-      float along = length(step_to);
-      bool flat_there = there.w != 0.0 && abs(dot(step_to, normal)) < 0.1 * along;
-      farthest = (flat_there && dot(step_to, path) >= 0.0) ? max(farthest, along) : farthest;
-    }
-    if (farthest == 0.0) {
-      return false;
-    }
-    reach += farthest;
-  }
-  return length(path) < reach;
-}
-
-// Where the cell's probe stands, and the pixel that shows it. What is straight below a point of the cell stays where it is
-// while the camera moves, and pixels do not; so of TRIALS points the first one counts below which the picture shows the
-// surface. Where no one does, as on twigs, the first one's pixel does.
-ivec2 pixel_of_cell(int entry, out uint id, out vec3 place)
-{
-  ivec2 any_pixel = lattice_pixel(int(sorted_order_fetch(ivec2(entry % LIST_COLUMNS, entry / LIST_COLUMNS)).x));
-  Cell cell = cell_of(any_pixel);
-  uvec3 bits = cell_bits(cell);
-  id = bits.z;
-  uvec3 roll = hash3(bits + uint(film_view.sample_index));
-  vec3 within = vec3(scrambled(film_view.bits_z, bits.x), scrambled(film_view.bits_w, bits.y), to_unit(roll.x));
-  ivec2 first = any_pixel;
-  for (int trial = 0; trial < TRIALS; trial++) {
-    vec3 middle = (vec3(cell.place) - CELL_OFFSET + within) * cell.side;
-    ivec2 pixel = nearest_pixel(entry, cell, middle);
-    vec3 position = surface_position_fetch(pixel).xyz;
-    vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
-    place = middle - dot(middle - position, normal) * normal;
-    bool within_cell = all(equal(ivec3(floor(place / cell.side + CELL_OFFSET)), cell.place));
-    if (within_cell && between_pixels(pixel, place, normal)) {
-      return pixel;
-    }
-    first = (trial == 0) ? pixel : first;
-    roll = hash3(roll);
-    within = vec3(to_unit(roll.x), to_unit(roll.y), to_unit(roll.z));
-  }
-  place = surface_position_fetch(first).xyz;
-  return first;
 }
 
 // The entry of the sorted list at which cell number `index` begins; -1 if there are fewer.
@@ -143,10 +92,18 @@ void main()
     return;
   }
   uint id;
-  Probe probe;
-  ivec2 pixel = pixel_of_cell(entry, id, probe.position);
+  vec3 middle;
+  ivec2 pixel = pixel_of_cell(entry, id, middle);
   Surface s = SURFACE_READ(pixel);
+  Probe probe;
   probe.receives = s.hit && (max_component(s.diffuse) > 0.0 || max_component(s.glossy_weight) > 0.0);
+  probe.position = s.position;
+  // What is straight below that point stays where it is, while pixels do not.
+  vec3 below = middle - dot(middle - s.position, s.geometric_normal) * s.geometric_normal;
+  vec3 across = surface_position_fetch(min(pixel + ivec2(1), surface_position_size() - 1)).xyz - s.position;
+  if (distance(below, s.position) < length(across) && length(across) < 0.5 * cell_of(s.position).side) {
+    probe.position = below;
+  }
   probe.normal = s.normal;
   probe.geometric_normal = s.geometric_normal;
   bool glass = s.kind == LOBE_REFRACTION;

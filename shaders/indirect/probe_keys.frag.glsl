@@ -1,6 +1,5 @@
 // Pixels that show the same cell have the same key; cells come in a random order, another one in every sample.
 #include "lib/random.glsl"
-#include "lib/math.glsl"
 #include "indirect/probe_cell.glsl"
 
 void main()
@@ -11,10 +10,10 @@ void main()
   if (index >= lattice.x * lattice.y) {
     return;
   }
-  ivec2 pixel = lattice_pixel(index);
-  if (surface_position_fetch(pixel).w == 0.0) {
+  vec4 position = surface_position_fetch(lattice_pixel(index));
+  if (position.w == 0.0) {
     return;
   }
-  uvec3 bits = cell_bits(cell_of(pixel));
+  uvec3 bits = cell_bits(cell_of(position.xyz));
   out_key = min(hash3(bits + uvec3(0u, 0u, uint(film_view.sample_index))).y, 0xFFFFFFFEu);
 }
