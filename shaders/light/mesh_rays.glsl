@@ -82,13 +82,4 @@ Light own_point(Light light, int number)
   return light;
 }
 
-float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
-{
-  vec3 origin = ray_origin(position, normal);
-  vec3 direction;
-  float density;
-  light_sample(light, origin, direction, density);
-  float reach = 0.9999 * light_distance(light, origin, direction);
-  uvec3 salt = roll_of(pixel, film_view.sample_index, film_view.seed, 17);
-  return clear_to_light(origin, direction, reach, salt.x, (light.flags & LIGHT_GLASS_BLOCKS) != 0);
-}
+#include "light/ray_visibility.glsl"
