@@ -50,6 +50,9 @@ class CANDELA_OT_quality_preset(bpy.types.Operator):
         return about(Path(properties.filepath)) or "Set what this preset holds"
 
     def execute(self, context):
+        if not Path(self.filepath).is_file():  # before anything is given up for it
+            self.report({"ERROR"}, f"There is no preset at {self.filepath}: choose another one in the menu.")
+            return {"CANCELLED"}
         own = context.scene.candela
         for name in CANDELA_OT_quality_preset_add.preset_values:
             own.property_unset(name.removeprefix("candela."))

@@ -106,6 +106,13 @@ def test_what_a_preset_does_not_name_gets_its_default(scene):
     assert scene.candela.direct_light_lights_per_sample == 16 and scene.candela.traced_refraction_interfaces == 16
 
 
+def test_a_preset_that_is_not_there_loses_nothing(scene, tmp_path):
+    scene.candela.samples = 77
+    with pytest.raises(RuntimeError, match="There is no preset at"):
+        bpy.ops.candela.quality_preset(filepath=str(tmp_path / "gone.py"))
+    assert scene.candela.samples == 77
+
+
 def test_each_preset_says_in_its_tooltip_what_it_is_for(scene):
     said = [quality.about(files()[name]) for name in (*NAMES, *KINDS)]
     assert all(20 < len(text) < 130 for text in said) and len(set(said)) == len(said)
