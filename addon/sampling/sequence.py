@@ -16,7 +16,8 @@ to bring it there, which leaves a point in every cell. (Put there alone, it woul
 would err 1.35 times as much at edges, mean square, and 64 points 1.17 times.)
 
 Sources: Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; Joe & Kuo, "Constructing Sobol sequences
-with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008 (direction numbers).
+with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008 (direction numbers);
+Appleby, MurmurHash3 (`_mixed`).
 """
 
 from __future__ import annotations
@@ -44,6 +45,17 @@ def _laine_karras(x: np.ndarray, seed: int) -> np.ndarray:
     for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
         x = (x ^ ((x * np.uint64(factor)) & _U32)) & _U32
     return x
+
+
+def _mixed(salt: int) -> int:
+    """A hash of 32 bits, each of which depends on all of the salt. The first bits of a scrambled number come from the
+    last bits of its scramble's seed alone: of two seeds that are multiples of one salt, the first points of a pair
+    would lie on a curve (a single point of a sky gave .72 of its light in the mean over seeds, 32 points .96)."""
+    salt &= 0xFFFFFFFF
+    for factor, shift in ((0x85EBCA6B, 16), (0xC2B2AE35, 13)):
+        salt ^= salt >> shift
+        salt = salt * factor & 0xFFFFFFFF
+    return salt ^ salt >> 16
 
 
 def _owen(x: np.ndarray, seed: int) -> np.ndarray:
@@ -107,7 +119,7 @@ def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
     salt = zlib.crc32(f"{use}/{seed}".encode())
     index = np.arange(first, first + count, dtype=np.uint64)
     pair = {FILM: _FILM_DIRECTIONS, LENS: _DIRECTIONS[3:5]}.get(use, _DIRECTIONS[:2])
-    numbers = [salt * 2654435761 + 1, salt * 2246822519 + 2]
+    numbers = [_mixed(salt + 1), _mixed(salt + 2)]
     scrambled = np.stack([_owen(_bits(index, axis), number) for axis, number in zip(pair, numbers)], axis=-1)
     if use in _FIRST:
         now = [_owen(np.zeros(1, np.uint64), number)[0] for number in numbers]
@@ -126,7 +138,7 @@ def _block(number: int, use: str, seed: int) -> list[tuple[float, float]]:
 @lru_cache(maxsize=1024)
 def _axis(number: int, dimension: int, use: str, seed: int) -> list[float]:
     salt = zlib.crc32(f"{use}/{seed}".encode())
-    scrambled = _owen(bits(_indices(number), dimension), salt * 3266489917 + 3)
+    scrambled = _owen(bits(_indices(number), dimension), _mixed(salt + 3))
     return (scrambled.astype(np.float64) / 4294967296.0).tolist()
 
 

@@ -117,3 +117,12 @@ def test_lens_and_lots_cover_the_plane_together_with_what_they_choose():
 def test_the_film_begins_in_its_middle_and_the_lens_in_the_apertures():
     assert sequence.point(0, FILM) == (0.5, 0.5) == sequence.point(0, FILM, seed=7)
     assert sequence.point(0, sequence.LENS) == (0.0, 0.0)
+
+
+def test_the_first_points_of_many_uses_fill_the_plane():
+    """Also a single point is anywhere: of 4,000 uses, each cell of 8 x 8 has its share of first points, third numbers
+    and pairs of both."""
+    first = np.array([(*sequence.point(0, f"use {k}"), sequence.third(0, f"use {k}")) for k in range(4000)])
+    for pair in ((0, 1), (0, 2), (1, 2)):
+        counts, *_ = np.histogram2d(*first[:, pair].T, bins=8, range=((0, 1), (0, 1)))
+        assert counts.min() > 0.5 * 62.5 and counts.max() < 1.6 * 62.5

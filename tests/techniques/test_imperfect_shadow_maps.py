@@ -166,6 +166,6 @@ def test_maps_do_not_depend_on_the_scale_of_the_scene(stage, render, scale):
         corner(stage, energy=60.0 * scale**2)
         shelf(stage, side=24, material=stage.diffuse(0.2))
         stage.enlarge(scale)
-        return render(2, points=256)
+        return render(2, points=256, samples=8)
 
     assert error(room(scale), room(1.0))[1] == pytest.approx(0.0, abs=0.02)
