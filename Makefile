@@ -11,7 +11,7 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-all test-more test-fast test-vulkan stress check matrix mutations package site test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport bench-beside clean
+.PHONY: help environment demo pictures samples test test-all test-more test-fast test-vulkan stress check matrix mutations package site test-window screenshots window-walk nodes pages bench bench-references bench-quick bench-viewport bench-beside clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
@@ -86,6 +86,9 @@ screenshots: package ## the manual's pictures, taken in a real Blender with a wi
 
 window-walk: package ## ten minutes of random edits in a real Blender with a window
 	STROLL_SECONDS=600 $(PYTHON) -m pytest -m window tests/window -rP -k random_walk
+
+pages: environment ## every generated page anew, all of one commit: hours; the next call goes on where this one stopped
+	$(PYTHON) -m bench pages
 
 nodes: environment ## every shader node beside Cycles: docs/nodes.md
 	$(PYTHON) -m bench.nodes
