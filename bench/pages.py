@@ -1,9 +1,9 @@
 """Every generated page anew, all of one commit: `make pages`, for a quiet night.
 
 The documents themselves say what writes them: `<!-- written by COMMAND -->` before each generated part, and
-bench/ages.py for pages that are written whole. These commands run one after the other, each in a process of its own. What is done is
-kept in out/pages.json, so that the next call goes on with the rest; a new commit begins again. A command that fails is
-named at the end, and its page stays as it was.
+bench/ages.py for pages that are written whole. These commands run one after the other, each in a process of its own.
+What is done is kept in out/pages.json, so that the next call goes on with the rest; a new commit begins again. What
+fails is named at the end, and its page stays as it was.
 """
 
 from __future__ import annotations
