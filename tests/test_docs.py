@@ -39,3 +39,9 @@ def test_the_readme_is_short_and_its_commands_exist():
     assert len(text.splitlines()) <= 120
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     assert set(re.findall(r"`?\bmake ([a-z-]+)", text)) <= targets
+
+
+def test_every_page_stands_once_in_the_menu_of_the_site():
+    listed = re.findall(r": (\S+\.md)$", (ROOT / "tools" / "site.yml").read_text(encoding="utf-8"), re.MULTILINE)
+    pages = [path.relative_to(ROOT / "docs").as_posix() for path in ROOT.glob("docs/**/*.md")]
+    assert sorted(listed) == sorted(page for page in pages if not page.startswith("log/") or page == "log/README.md")
