@@ -44,6 +44,24 @@ def sequence_path(path: str, frame: int) -> str:
     return str(Path(folder) / f"{stem[: found.start()]}{number}{stem[found.end() :]}{dot}{ending}")
 
 
+def turn_movie(image, frame: int) -> bool:
+    """Make `Image.pixels` of a movie those of a frame, counted from 1; whether there is such a movie.
+
+    `Image.pixels` has the frame that Blender read last, and a texture says which one it reads (all of 4.5 to 5.3).
+    """
+    if not image.frame_duration:
+        return False
+    texture = bpy.data.textures.new("candela movie", "IMAGE")
+    try:
+        texture.image = image
+        texture.image_user.frame_duration = image.frame_duration
+        texture.image_user.frame_current = frame
+        texture.evaluate((0.0, 0.0, 0.0))
+    finally:
+        bpy.data.textures.remove(texture)
+    return image.has_data
+
+
 def tile_path(path: str, number: int) -> str:
     """The file of a UDIM tile."""
     index = number - FIRST_TILE

@@ -22,7 +22,7 @@ from ..materials.estimate import srgb_decode
 from ..materials.ies import Profile, profile_pixels
 from ..materials.sky import Sky, working_sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
-from .image_files import frame_of, read_file, read_layer, scaled, sequence_path, tile_path, to_scene_linear
+from .image_files import frame_of, read_file, read_layer, scaled, sequence_path, tile_path, to_scene_linear, turn_movie
 from .scene import Image, Note
 
 # Byte images in these colour spaces need no decoding; sRGB is decoded after filtering, as in Cycles.
@@ -136,7 +136,7 @@ def whole_key(uid: int) -> str:
 
 @dataclass(frozen=True)
 class OfSequence:
-    """A frame of an image sequence."""
+    """A frame of an image sequence or of a movie."""
 
     frame: int
 
@@ -160,7 +160,7 @@ Part = OfSequence | Layer | None
 
 def _part(original, user, frame: int) -> Part:
     _ = original.size[0]  # makes Blender load the file, and find out what it holds
-    if original.source == "SEQUENCE":
+    if original.source in ("SEQUENCE", "MOVIE"):
         return OfSequence(frame_of(user, frame) if user is not None else 1)
     if original.type == "MULTILAYER":
         return Layer(getattr(user, "multilayer_layer", 0), getattr(user, "multilayer_pass", 0))
@@ -178,15 +178,18 @@ def _pixels(original, part: Part) -> tuple[np.ndarray, tuple, bool, tuple[Note, 
     space, tiles = original.colorspace_settings.name, ()
     text = "the image is missing or cannot be read and is drawn magenta; check its file path."
     found, notes = None, ()
-    if isinstance(part, OfSequence):
+    if original.source == "MOVIE":
+        found = _own_pixels(original) if turn_movie(original, part.frame) else None
+        text = (
+            f"frame {part.frame} of the movie cannot be read and is drawn magenta; check its file path and its codec."
+        )
+    elif isinstance(part, OfSequence):
         found = read_file(sequence_path(_path(original), part.frame), space)
         text = f"frame {part.frame} of the sequence is missing and is drawn magenta; check its file path."
     elif isinstance(part, Layer):
         found = read_layer(_path(original), part.layer, part.number)
         if isinstance(found, str):
             found, text = None, found
-    elif original.source == "MOVIE":
-        text = "frames of movies cannot be read and are drawn magenta; use an image sequence."
     elif original.source == "TILED" and len(original.tiles) > 1:
         numbers = [tile.number for tile in original.tiles]
         parts = [(number, _tile(original, number, space)) for number in numbers]
@@ -288,7 +291,7 @@ def _state(original, part: Part) -> tuple:
     """Facts that change when the pixels of a saved or generated image do; first those of its files."""
     path = _path(original)
     paths = [path] if path and original.packed_file is None else []
-    if isinstance(part, OfSequence):
+    if isinstance(part, OfSequence) and original.source == "SEQUENCE":
         paths = [sequence_path(path, part.frame)]
     elif original.source == "TILED" and path:
         paths = [tile_path(path, tile.number) for tile in original.tiles]

@@ -289,3 +289,53 @@ def test_tiles_are_scaled_until_they_fit(monkeypatch):
         (1001 + k, (4, 4, 4), float(k)) for k in range(3)
     ]
     assert "1/2 of their width" in str(notes[0])
+
+
+def movie_of(tmp_path, colors):
+    """The file of a movie of one frame for each colour, which Blender's sequencer writes."""
+    scene = bpy.data.scenes.new("movie")
+    render = scene.render
+    if hasattr(render.image_settings, "media_type"):
+        render.image_settings.media_type = "VIDEO"
+    render.image_settings.file_format = "FFMPEG"
+    render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.constant_rate_factor = "MPEG4", "H264", "LOSSLESS"
+    render.resolution_x = render.resolution_y = 16
+    render.filepath, scene.frame_end = str(tmp_path / "movie.mp4"), len(colors)
+    scene.view_settings.view_transform = "Standard"
+    editor = scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    for k, color in enumerate(colors):
+        length = {"length": 1} if bpy.app.version >= (5, 0) else {"frame_end": k + 2}
+        strip = strips.new_effect(name=str(k), type="COLOR", channel=1, frame_start=k + 1, **length)
+        strip.color = color
+    bpy.ops.render.render(animation=True, scene=scene.name)
+    bpy.data.scenes.remove(scene)
+    (path,) = tmp_path.glob("*.mp4")
+    return str(path)
+
+
+def test_frames_of_movies_are_read_as_blender_reads_them(stage, tmp_path):
+    colors = [(0.0, 0.5, 1.0), (0.5, 0.5, 0.0), (1.0, 0.0, 0.5)]
+    image, cache = bpy.data.images.load(movie_of(tmp_path, colors)), SnapshotCache()
+    assert image.source == "MOVIE"
+    user = shown(stage, image).image_user
+    user.frame_duration = 3
+    for offset, frame in ((0, 0), (1, 1), (9, 2), (9, 2)):  # after its end a movie shows its last frame
+        user.frame_offset = offset
+        snapshot = stage.take(cache)
+        assert not snapshot.notes
+        taken = only_image(snapshot)
+        assert taken.encoding == "SRGB"
+        assert np.allclose(taken.pixels[8, 8, :3], colors[frame], atol=0.02)
+    assert snapshot.sync_stats["images_read"] == 0
+
+
+def test_a_movie_that_is_not_there_is_named(stage, tmp_path):
+    image = bpy.data.images.load(movie_of(tmp_path, [(1.0, 1.0, 1.0)]))
+    image.filepath_raw = str(tmp_path / "other.mp4")
+    image.reload()
+    shown(stage, image).image_user.frame_duration = 1
+    snapshot = stage.take()
+    assert only_image(snapshot).missing
+    (note,) = snapshot.notes
+    assert "of the movie" in note.text
