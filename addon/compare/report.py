@@ -16,6 +16,7 @@ from string import Template
 import numpy as np
 
 from .comparison import Comparison, Picture
+from .first_row import Shown
 from .metrics import EMPTY_DEPTH, PathError, display, figures, is_surface
 from .png import data_url, png
 
@@ -81,6 +82,7 @@ def page(data: Comparison) -> str:
         title=_text(f"{data.scene}: {data.engine} against {data.reference_engine}"),
         heading=_text(f"{data.engine} against {data.reference_engine}"),
         facts=_facts(data),
+        conclusion=_conclusion(data),
         opening=_opening(data),
         cards=_cards(data),
         stage_width=max(width, 860) if width < 1140 else 1140,
@@ -101,14 +103,59 @@ def page(data: Comparison) -> str:
     )
 
 
+def _conclusion(data: Comparison) -> str:
+    """What the figures of the first row come to, in sentences; nothing without a first row."""
+    own = [one for one in data.opening if not one.peer]
+    if not own:
+        return ""
+    whole = own[-1]
+    said = [
+        f"{data.engine}'s picture of {whole.label} took {_time(whole.seconds)}. {_seen(whole, data.reference_engine)}",
+        *(_beside(one, whole) for one in data.opening if one.peer),
+    ]
+    return f'<p class="conclusion">{_text(" ".join(said))}</p>'
+
+
+def _seen(one: Shown, reference: str) -> str:
+    if one.relmse <= max(GOOD, one.floor):
+        return f"At a glance nobody can tell it from {reference}' picture with many samples."
+    if one.relmse <= FAIR:
+        return f"Beside {reference}' picture with many samples small differences can be seen."
+    return f"It differs visibly from {reference}' picture with many samples."
+
+
+def _beside(peer: Shown, whole: Shown) -> str:
+    """One sentence about another engine; errors that the noise of the truth hides are called equal."""
+    low, high = sorted((peer.relmse, whole.relmse))
+    if high - low <= peer.floor + whole.floor or high <= 1.1 * low:
+        error = "about the same error"
+    elif low == peer.relmse:
+        error = f"{100 * low / high:.0f} % of the error"
+    else:
+        error = f"{high / max(low, 1e-12):.{1 if high < 10 * low else 0}f} times the error"
+    return f"{peer.label} took {_time(peer.seconds)} and has {error}."
+
+
 def _opening(data: Comparison) -> str:
-    """The first row: what few samples look like, and Cycles in the time of the last."""
+    """The first row: what few samples look like, Cycles in the time of the last, EEVEE."""
+    if not data.opening:
+        return ""
     figures = []
     for one in data.opening:
-        told = f'<span>{one.seconds:.2f} s</span><span title="relMSE">error {_scientific(f"{one.relmse:.1e}")}</span>'
+        error = _scientific(f"{one.relmse:.1e}")
+        noise = f" ± {_scientific(f'{one.floor:.0e}')}" if one.floor > 0.05 * one.relmse else ""
+        told = f'<span>{one.seconds:.2f} s</span><span title="relMSE">error {error}{noise}</span>'
         caption = f"<figcaption><b>{_text(one.label)}</b>{told}</figcaption>"
         figures.append(f'<figure><img alt="{_text(one.label)}" src="{_plain(one.pixels)}">{caption}</figure>')
-    return f'<section class="opening" aria-label="First row">{"".join(figures)}</section>' if figures else ""
+    about = (
+        f"Time is that of a whole render with everything compiled. The error is the mean squared difference from "
+        f"{data.reference_engine}' picture, relative to its brightness (relMSE): up to {GOOD} two pictures are not "
+        f"told apart at a glance, from {FAIR} on the difference is plain. ± is the noise that the reference has left."
+    )
+    return (
+        f'<h2>Few samples, and other engines</h2><p class="dim">{_text(about)}</p>'
+        f'<section class="opening" aria-label="First row">{"".join(figures)}</section>'
+    )
 
 
 def _plain(image: np.ndarray) -> str:

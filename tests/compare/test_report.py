@@ -227,3 +227,28 @@ def test_the_first_row_opens_the_page_with_time_and_error_of_each():
     assert opening.count("<figure>") == 2
     assert "<b>1 sample</b><span>0.25 s</span>" in opening and "<span>1.50 s</span>" in opening
     assert '<section class="opening"' not in page(comparison())
+
+
+def test_the_page_opens_with_what_the_figures_come_to_and_then_the_picture():
+    pixels = np.ones((6, 8, 4), np.float32)
+    row = (
+        Shown("16 samples", pixels, 2.5, 2e-3, 2e-4),
+        Shown("Cycles, denoised", pixels, 2.4, 5e-3, 1e-4, peer=True),
+        Shown("EEVEE, 16 samples", pixels, 1.25, 1e-3, 1e-4, peer=True),
+    )
+    text = page(comparison(opening=row))
+    told = text[text.index('class="conclusion"') : text.index('class="viewer"')]
+    assert "picture of 16 samples took 2.5 s. At a glance nobody can tell it from Cycles&#x27; picture" in told
+    assert "Cycles, denoised took 2.4 s and has 2.5 times the error." in told
+    assert "EEVEE, 16 samples took 1.2 s and has 50 % of the error." in told
+    assert text.index('class="viewer"') < text.index('class="opening"')
+    assert "error 2.0·10⁻³ ± 2·10⁻⁴" in text[text.index('class="opening"') :]
+
+
+def test_what_the_noise_of_the_truth_hides_is_called_equal():
+    pixels = np.ones((6, 8, 4), np.float32)
+    row = (
+        Shown("16 samples", pixels, 2.5, 2e-3, 1e-3),
+        Shown("Cycles, denoised", pixels, 2.4, 3e-3, 1e-3, peer=True),
+    )
+    assert "has about the same error" in page(comparison(opening=row))
