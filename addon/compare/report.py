@@ -117,9 +117,10 @@ def _conclusion(data: Comparison) -> str:
 
 
 def _seen(one: Shown, reference: str) -> str:
-    if one.relmse <= max(GOOD, one.floor):
+    error = one.relmse - one.floor  # the reference's noise is part of the difference
+    if error <= GOOD:
         return f"At a glance nobody can tell it from {reference}' picture with many samples."
-    if one.relmse <= FAIR:
+    if error <= FAIR:
         return f"Beside {reference}' picture with many samples small differences can be seen."
     return f"It differs visibly from {reference}' picture with many samples."
 
