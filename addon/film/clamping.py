@@ -22,7 +22,7 @@ one of them and multiplies its light by their number; light behind media is clam
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache
 
@@ -45,6 +45,7 @@ CLAMP_INDIRECT = Param(
     0.0, 1e8,
 )  # fmt: skip
 LIMITS = {DIRECT: CLAMP_DIRECT, INDIRECT: CLAMP_INDIRECT}
+MOST_IMAGES = 6  # that Blender lets a pass draw into
 CLAMPED = tuple(path.image for path in LIGHT_PATHS)  # held apart while a limit is set
 
 
@@ -61,24 +62,33 @@ def groups_of(paths: tuple[LightPath, ...]) -> list[list[LightPath]]:
 
 
 @cache
-def clamp_program(names: tuple[str, ...]) -> Program:
-    """Copies the images of these light paths, of one order, with no contribution above the limit."""
+def clamp_program(names: tuple[str, ...], drawn: tuple[str, ...]) -> Program:
+    """Copies the images of those of these light paths, of one order, that are `drawn`, with no contribution above the
+    limit."""
     lines = []
     for group in groups_of(tuple(path for path in LIGHT_PATHS if path.name in names)):
         together = " + ".join(f"{path.name}_fetch(pixel).rgb" for path in group)
         lines.append(f"kept = share_below({together}, most);")
-        lines += [f"out_{path.name} = {path.name}_fetch(pixel) * vec4(vec3(kept), 1.0);" for path in group]
+        lines += [
+            f"out_{path.name} = {path.name}_fetch(pixel) * vec4(vec3(kept), 1.0);"
+            for path in group if path.name in drawn
+        ]  # fmt: skip
     return passes.fullscreen_program(
         "film clamp",
         "film/clamp.frag.glsl",
         textures=tuple(("RGBA32F", name) for name in names),
         constants=(("FLOAT", "most"),),
         defines=(("CLAMP_ALL", " ".join(lines)),),
-        outputs=tuple(("VEC4", f"out_{name}") for name in names),
+        outputs=tuple(("VEC4", f"out_{name}") for name in drawn),
     )
 
 
-CLAMP = tuple(clamp_program(tuple(path.name for path in LIGHT_PATHS if path.order == order)) for order in LIMITS)
+def _of_order(order: str, among: Collection[str]) -> tuple[str, ...]:
+    return tuple(path.name for path in LIGHT_PATHS if path.order == order and path.name in among)
+
+
+_DECLARED = [_of_order(order, [path.name for path in LIGHT_PATHS]) for order in LIMITS]
+CLAMP = tuple(clamp_program(names, names[:MOST_IMAGES]) for names in _DECLARED)
 
 
 @contextmanager
@@ -89,16 +99,17 @@ def clamped(seen: dict[str, images.Image], most: dict[str, float]) -> Iterator[d
     with ExitStack() as stack:
         copies = {}
         for order, limit in most.items():
-            paths = tuple(path.name for path in LIGHT_PATHS if path.order == order and path.name in by_path)
+            paths = _of_order(order, by_path)
             if not paths:
                 continue
             size = seen[by_path[paths[0]]].size
             targets = [stack.enter_context(images.borrowed(*size, "RGBA32F")).colors[0] for _ in paths]
-            passes.fullscreen(
-                clamp_program(paths),
-                images.Target(tuple(targets)),
-                textures={path: seen[by_path[path]] for path in paths},
-                constants={"most": 3.0 * limit},
-            )
+            for part in range(0, len(paths), MOST_IMAGES):
+                passes.fullscreen(
+                    clamp_program(paths, paths[part : part + MOST_IMAGES]),
+                    images.Target(tuple(targets[part : part + MOST_IMAGES])),
+                    textures={path: seen[by_path[path]] for path in paths},
+                    constants={"most": 3.0 * limit},
+                )
             copies |= {by_path[path]: target for path, target in zip(paths, targets)}
         yield {**seen, **copies}

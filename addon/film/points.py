@@ -24,6 +24,9 @@ window .086 1.1, .054 1.3; four samples, garden .0087 1.4, .0072 1.6; window .02
 | draws | those of the surface pass, two passes of the film and one of this |
 | fetches per pixel | 10 + 4, at edges 9 x 9 |
 
+The six paths of diffuse, glossy and transmitted light are carried over in one pass. Further rows of the table are
+carried in rounds of as many: each as the path of its lobe and order, those of other lobes as diffuse light is.
+
 Bias: at edges, of indirect light, and of direct light where it is not repeated (repeated_light.py), which is that of
 the next pixel on the surface; light's own edges are half a pixel wider. It ends where K = 1.
 """
@@ -34,7 +37,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
-from ..frame.light_paths import MEDIUM, SURFACE, named
+from ..frame.light_paths import DIRECT, INDIRECT, LIGHT_PATHS, MEDIUM, SURFACE, LightPath, named, surface_path
 from ..frame.picture import Frame
 from ..frame.technique import Param, Service
 from ..gfx import images, passes
@@ -52,8 +55,11 @@ POINTS = Param(
     1, 1024, draft=1,
 )  # fmt: skip
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
-PATHS = named(SURFACE)
+LOBES = ("diffuse", "glossy", "transmission")  # by which light is carried over
+CARRIERS = tuple(surface_path(lobe, order) for order in (DIRECT, INDIRECT) for lobe in LOBES)
+PATHS = tuple(path for path in named(SURFACE) if path in CARRIERS)
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
+FURTHER = tuple(path for path in LIGHT_PATHS if path.origin == SURFACE and path.name not in CARRIERS)
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
 
 
@@ -119,7 +125,25 @@ def costs(frame: Frame) -> PointCosts:
 
 def lit_paths(frame: Frame) -> tuple[str, ...]:
     """Light paths that techniques of the plan may add to: diffuse and glossy always, through glass by need."""
-    return PATHS if refracts(frame) else REFLECTED
+    further = tuple(path.name for path in FURTHER if path.image in frame.images)
+    return (*(PATHS if refracts(frame) else REFLECTED), *further)
+
+
+def carrier(path: LightPath) -> str:
+    """The path as which light of another one is carried over."""
+    return surface_path(path.lobe if path.lobe in LOBES else LOBES[0], path.order)
+
+
+def rounds(paths: tuple[str, ...]) -> list[dict[str, str]]:
+    """Passes that carry `paths`: of each what it carries, by the path as which."""
+    made = [{path: path for path in paths if path in CARRIERS}]
+    for path in FURTHER:
+        if path.name in paths:
+            free = next((one for one in made if carrier(path) not in one), None)
+            if free is None:
+                made.append(free := {})
+            free[carrier(path)] = path.name
+    return made
 
 
 def pixel_paths(frame: Frame) -> tuple[str, ...]:
@@ -132,7 +156,7 @@ def shown_paths(frame: Frame) -> set[str]:
     writers = [technique for technique in frame.plan.techniques if technique.name != "film"]
     written = {write.name for technique in writers for write in technique.writes}
     glossy = may_be_glossy(frame.snapshot)
-    paths = (*PATHS, *pixel_paths(frame))
+    paths = (*named(SURFACE), *pixel_paths(frame))
     return {path for path in paths if f"radiance.{path}" in written and (glossy or not path.startswith("glossy"))}
 
 
@@ -179,12 +203,15 @@ def light_between(
     surfaces: dict[str, images.Image],
     point: int,
     repeated: bool,
+    carried: dict[str, str] | None = None,
 ) -> None:
     """Draw into `target`, an image for each that is `drawn` (as of between_program), what `surfaces` (by names of
     SURFACE_IMAGES), seen at this point of the film, reflect of this sample's light. `repeated`: direct light at edges
-    is left to repeated_light.py; the target's depth marks them by 1."""
+    is left to repeated_light.py; the target's depth marks them by 1. `carried`: the paths whose light it is, by those
+    of `paths` as which it is carried (as of `rounds`); none: of these themselves."""
     between = tuple(there - own for there, own in zip(frame.film_offset(point), frame.film_offset(frame.sample)))
-    textures = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
+    carried = carried or {}
+    textures = {f"light_{path}": frame.images[f"radiance.{carried.get(path, path)}"] for path in paths}
     textures |= {f"surface_{guide}": surfaces[guide] for guide in GUIDES}
     textures |= {f"known_{guide}": frame.images[f"surface.{guide}"] for guide in GUIDES}
     passes.fullscreen(

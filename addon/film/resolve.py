@@ -19,9 +19,10 @@ from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from .neighbours import shown_sum
-from .together import SUM, held_apart
+from .together import SUM, folded, held_apart
 
 COMBINED = "film.combined"
+MOST_READ = 16  # images, by a pass
 
 
 @cache
@@ -56,7 +57,7 @@ def resolve_program(names: tuple[str, ...]) -> Program:
 RESOLVE = (
     resolve_program((SUM,)),
     *(
-        resolve_program(tuple(path.name for path in LIGHT_PATHS if all_of_them or not path.by_need))
+        resolve_program(tuple(path.name for path in LIGHT_PATHS if all_of_them or not path.by_need)[:MOST_READ])
         for all_of_them in (False, True)
     ),
 )
@@ -75,14 +76,15 @@ def resolve(frame: Frame) -> images.Image:
         if "diffuse_indirect" in paths:
             textures["diffuse_indirect"] = indirect
         if TOGETHER in frame.images:
-            paths, textures = (*paths, SUM), textures | {SUM: frame.images[TOGETHER]}
-        passes.fullscreen(
-            resolve_program(paths),
-            target,
-            textures=textures,
-            constants={
-                "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
-                "transparent": int(frame.snapshot.film.transparent),
-            },
-        )  # fmt: skip
+            textures[SUM] = frame.images[TOGETHER]
+        with folded(textures, MOST_READ) as read:
+            passes.fullscreen(
+                resolve_program(tuple(name for name in (*paths, SUM) if name in read)),
+                target,
+                textures=read,
+                constants={
+                    "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
+                    "transparent": int(frame.snapshot.film.transparent),
+                },
+            )  # fmt: skip
     return target.colors[0]

@@ -20,14 +20,19 @@ Bias: none. Sums differ from those of paths by rounding: floats are added in ano
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
 
 from ..frame.light_paths import IN_MEDIA, LIGHT_PATHS, MEDIUM, SEEN, SURFACE, TOGETHER, LightPath
 from ..frame.picture import Frame
+from ..gfx import images, passes
+from ..gfx.library import Program
 
 SUM = TOGETHER.rpartition(".")[2]  # beside names of paths
 BESIDE = ("color.diffuse", "color.glossy", "color.transmission", "surface.normal_sum")  # sums that are no light
 COLLECTED = (*(path.image for path in LIGHT_PATHS if path.origin == SEEN), *BESIDE)  # what a point shows without light
+MOST_FOLDED = 16  # textures that a pass may read
 MOST_COLLECTED = 5  # beside the sum: a pass draws into six images
 
 
@@ -77,3 +82,35 @@ def terms(names: Sequence[str], read: str) -> str:
         else:
             found.append(f"vec4({light}.rgb, 0.0)")
     return " + ".join(found) or "vec4(0.0)"
+
+
+@cache
+def folding_program(names: tuple[str, ...]) -> Program:
+    """Sums up the light of these paths."""
+    return passes.fullscreen_program(
+        "film light summed up",
+        "film/folded.frag.glsl",
+        textures=tuple(("RGBA32F", name) for name in names),
+        defines=(("FOLDED", terms(names, "{0}_fetch(pixel)")),),
+        outputs=(("VEC4", "out_sum"),),
+    )
+
+
+FOLDING = folding_program((SUM, LIGHT_PATHS[0].name))
+
+
+@contextmanager
+def folded(light: dict[str, images.Image], most: int) -> Iterator[dict[str, images.Image]]:
+    """`light`, by names of paths, in at most `most` images, so that a pass can read it beside others: where there are
+    more, what is over is summed up with SUM."""
+    if len(light) <= most:
+        yield light
+        return
+    ordered = {name: light[name] for name in (SUM, *light) if name in light}
+    first = tuple(ordered)[: len(light) - most + 1]
+    with images.borrowed(*ordered[first[0]].size, "RGBA32F") as target:
+        for start in range(0, len(first), MOST_FOLDED):
+            part = first[start : start + MOST_FOLDED]
+            how = {"blend": "ADDITIVE_PREMULT"} if start else {}
+            passes.fullscreen(folding_program(part), target, textures={name: light[name] for name in part}, **how)
+        yield {SUM: target.colors[0], **{name: light[name] for name in light if name not in first}}

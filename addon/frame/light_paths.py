@@ -78,6 +78,11 @@ LIGHT_PATHS = (
 )  # fmt: skip
 
 
+def surface_path(lobe: str, order: str) -> str:
+    """Name of the first path of that lobe and order, by which others of it are carried over (film/points.py)."""
+    return next(path.name for path in LIGHT_PATHS if (path.origin, path.lobe, path.order) == (SURFACE, lobe, order))
+
+
 def named(origin: str) -> tuple[str, ...]:
     """Names of the paths of an origin, in the table's order."""
     return tuple(path.name for path in LIGHT_PATHS if path.origin == origin)

@@ -59,6 +59,7 @@ SUMS = {
     "surface.normal_sum": ("out_normal", "World-space shading normal; alpha: hits"),
     TOGETHER: ("out_together", "Light of all paths that nobody looks at apart; alpha: coverage"),
 }
+MOST_LIGHT = 6  # images that the pass which collects reads beside others
 EMISSION, WORLD_SEEN = "radiance.emission", film_filter.WORLD_SEEN
 LIGHT = tuple(path for path in LIGHT_PATHS if path.origin != SEEN)  # what techniques add to in each sample
 
@@ -176,9 +177,8 @@ class Film(Technique):
         self._held = together.collected(frame)
         self._limits = clamping.limits(frame.settings, self)
         light = (tuple(f"film.{path}" for path in paths) for paths in (self._apart, self._pixel_paths))
-        for names in (self._held, *light):  # apart: a target has at most six images
-            if names:
-                _target(frame, *names).clear()
+        for names in (self._held, *light):
+            _clear(frame, names)
         emitters = frame.emitters
         seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
         self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
@@ -212,8 +212,7 @@ class Film(Technique):
             yield
             yield from self._between(frame, count)
         for paths in (self._paths, self._pixel_paths):
-            if paths:
-                frame.target(*(f"radiance.{path}" for path in paths)).clear()
+            _clear(frame, tuple(f"radiance.{path}" for path in paths))
         repeated_light.forget(frame)
         for path in (*self._apart, *self._pixel_paths):
             frame.shown[f"radiance.{path}"] = f"film.{path}"
@@ -259,16 +258,20 @@ class Film(Technique):
         first = frame.settings.samples + frame.sample * (count - 1)
         repeated = frame.settings.get(self, "edges") and repeated_light.possible(frame)
         own = repeated_light.PATHS if repeated else ()  # which are added to after the others
-        alone = tuple(path for path in self._paths if path in self._apart or path in own)
-        carried = (*alone, together.SUM) if set(self._summed) - set(alone) else alone
+        first_round, *more = film_points.rounds(self._paths)
+        paths = tuple(first_round)
+        alone = tuple(path for path in paths if path in self._apart or path in own)
+        carried = (*alone, together.SUM) if set(self._summed).intersection(paths) - set(alone) else alone
+        further = tuple(path for carriers in more for path in carriers.values())
         with (
             _borrowed(frame, len(SURFACES)) as drawn,
             _borrowed(frame, len(self._held)) as collected,
             _borrowed(frame, len(carried)) as light,
+            _borrowed(frame, len(further)) as more_light,
             _borrowed(frame, 1, "DEPTH_COMPONENT32F") as (depth,),
         ):
             target, marked = images.Target(drawn, depth), images.Target(light, depth)
-            surfaces, by_path = dict(zip(SURFACE_IMAGES, drawn)), dict(zip(carried, light))
+            surfaces, by_path = dict(zip(SURFACE_IMAGES, drawn)), dict(zip((*carried, *further), (*light, *more_light)))
             added = {path: image for path, image in by_path.items() if path not in self._apart}
             direct = images.Target(tuple(by_path[path] for path in own), depth) if repeated else None
             try:
@@ -276,8 +279,12 @@ class Film(Technique):
                     frame.look(film=point)
                     draw_sample(frame, self, target)
                     bindings = {f"surface_{name}": image for name, image in surfaces.items()}
-                    film_points.light_between(frame, self._paths, carried, marked, surfaces, point, repeated)
-                    frame.count(self, "passes")
+                    film_points.light_between(frame, paths, carried, marked, surfaces, point, repeated)
+                    for carriers in more:
+                        into = images.Target(tuple(by_path[path] for path in carriers.values()))
+                        how = (paths, tuple(carriers), into, surfaces, point, False)
+                        film_points.light_between(frame, *how, carried=carriers)
+                    frame.count(self, "passes", 1 + len(more))
                     if repeated:
                         repeated_light.repeat(frame, self._repeated, bindings, direct)
                         frame.count(self, "passes", len(frame.shared(repeated_light.KeptLight).passes))
@@ -298,19 +305,20 @@ class Film(Technique):
         """Draw what needs no light, at the point of the film that is looked at, into an image for each sum that is
         held; into that of all paths together with the `light` of those that are not apart."""
         by_name, world = dict(zip(self._held, collected)), not frame.snapshot.film.transparent
-        passes.fullscreen(
-            collect_program(self._seen, Collected(self._held, tuple(light), world)),
-            images.Target(collected),
-            textures={
-                **surfaces, **{f"light_{path}": image for path, image in light.items()},
-                "energy_table": frame.materials.energy_table, "environment_map": frame.environment.map,
-                "environment_density_map": frame.environment.density_map,
-            },
-            blocks={
-                "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
-            },
-            constants={"light_count": self._light_count, "mist": _mist_constant(frame)},
-        )  # fmt: skip
+        with together.folded(light, MOST_LIGHT) as read:
+            passes.fullscreen(
+                collect_program(self._seen, Collected(self._held, tuple(read), world)),
+                images.Target(collected),
+                textures={
+                    **surfaces, **{f"light_{path}": image for path, image in read.items()},
+                    "energy_table": frame.materials.energy_table, "environment_map": frame.environment.map,
+                    "environment_density_map": frame.environment.density_map,
+                },
+                blocks={
+                    "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
+                },
+                constants={"light_count": self._light_count, "mist": _mist_constant(frame)},
+            )  # fmt: skip
         frame.count(self, "passes")
         add_glow(frame, self, surfaces["surface_position"], by_name.get(EMISSION) or by_name[TOGETHER])
         shown = by_name.get(WORLD_SEEN) or (by_name[TOGETHER] if world else None)
@@ -367,6 +375,12 @@ def _target(frame: Frame, *names: str) -> images.Target:
         if name not in frame.images:
             frame.images[name] = images.pool.take(*frame.size, "RGBA32F")
     return frame.target(*names)
+
+
+def _clear(frame: Frame, names: tuple[str, ...]) -> None:
+    """Without light, by as many images as a target has."""
+    for part in range(0, len(names), film_filter.MOST_IMAGES):
+        _target(frame, *names[part : part + film_filter.MOST_IMAGES]).clear()
 
 
 def _mist_constant(frame: Frame) -> tuple[float, float, float, float]:

@@ -346,7 +346,7 @@ class CANDELA_VIEWLAYER_PT_passes(_CandelaPanel, bpy.types.Panel):
             part = column.column(align=True, heading="Include" if number == 0 else "")
             *owner, switch = render_pass.switch.split(".")
             holder = getattr(context.view_layer, owner[0], None) if owner else context.view_layer
-            if holder is not None:  # switches that Cycles brings are there while it is enabled
+            if hasattr(holder, switch):  # those that Cycles brings are there while it is enabled
                 part.prop(holder, switch, text=render_pass.name)
 
 

@@ -77,10 +77,12 @@ def _in_blenders_order(rows: tuple) -> list:
 
 
 def _place(name: str) -> int:
+    """Of a pass in Blender's list; those of lobes that it does not know stand behind it."""
     order = ("Diffuse", "Glossy", "Transmission", "Volume", "Emission", "Environment")
     parts = ("Direct", "Indirect", "Color")
-    lobe, _, part = name.partition(" ")
-    return 4 * order.index(lobe) + (parts.index(part) if part in parts else 0)
+    lobe = next((one for one in order if name.split(" ")[0] == one), None)
+    part = next((place for place, one in enumerate(parts) if name.endswith(one)), 0)
+    return 4 * (order.index(lobe) if lobe else len(order)) + part
 
 
 PASSES = tuple(

@@ -1,15 +1,16 @@
 """What the contract promises: how little a new technique, a new provider of visibility or a new light path costs."""
 
 import inspect
+import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from addon.film import resolve as resolving
 from addon.frame import light_paths
-from addon.frame.light_paths import LIGHT_PATHS, MEDIUM, LightPath
 from addon.frame.plan import PlanError, make_plan
 from addon.frame.run import Renderer
 from addon.frame.settings import Settings
@@ -108,32 +109,21 @@ def test_a_provider_that_answers_one_half_is_short_and_halves_the_light(gpu_cont
 # A light path --------------------------------------------------------------------------------------------------------
 
 
-class Glow(Technique):
-    """Light of a path that is new: one everywhere."""
-
-    name, label = "glow", "Glow"
-    reads = ("surface.position",)
-    writes = (Write("radiance.glow", "RGBA32F", "One", True),)
-
-    def sample(self, frame):
-        frame.target("radiance.glow").clear((1.0, 1.0, 1.0, 1.0))
-
-
-def test_a_new_light_path_is_one_row(gpu_context, monkeypatch):
-    """Resolve, and what derives names from the table, take it without another line."""
-    row = LightPath("glow", "Glow", "Glow", "use_pass_glow", MEDIUM, by_need=True)
-    rows = (*LIGHT_PATHS, row)
-    monkeypatch.setattr(light_paths, "LIGHT_PATHS", rows)
-    monkeypatch.setattr(resolving, "LIGHT_PATHS", rows)
-    from addon.techniques import film
-
-    monkeypatch.setattr(film, "LIGHT", (*film.LIGHT, row))
-    monkeypatch.setattr(film.Film, "writes", (*film.Film.writes, Write(row.image, "RGBA32F", "Glow", True, True)))
-    monkeypatch.setattr(film.Film, "finishes", (*film.Film.finishes, row.image))
-    dark = room(lights=())
-    _, _, without = drawn(make_registry(), dark, samples=2)
-    _, _, with_glow = drawn((*make_registry(), Glow()), dark, samples=2)
-    np.testing.assert_allclose(with_glow["film.combined"][..., :3], without["film.combined"][..., :3] + 1.0, atol=1e-5)
+def test_a_light_path_of_a_surface_of_a_lobe_or_of_a_medium_is_one_row_of_the_table():
+    """Film, clamp, resolve, passes and comparison take three more rows without another line, in a process of its own:
+    apart and summed up, at one point of the film for each sample and at several, where edges are lit again, too."""
+    run = [sys.executable, "-m", "tests.frame.further_paths"]
+    done = subprocess.run(run, check=False, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    for how in ("apart", "together", "clamped", "repeated"):
+        np.testing.assert_allclose(found[how], 7.0, rtol=1e-5, err_msg=how)  # of 1, 2 and 4
+    assert found["passes"] == [
+        "radiance.below_direct / color.diffuse",
+        "radiance.sheen_direct / color.sheen",
+        "radiance.glow",
+    ]
+    assert found["compared"] == ["below_direct", "sheen_direct", "glow"]
 
 
 # Ownership and slots -------------------------------------------------------------------------------------------------
