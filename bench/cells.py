@@ -179,7 +179,6 @@ class Cell:
             "reference": self.reference_samples,
             "machine": machine,
             "sources": sources() if self.series.own else "",
-            "auto": auto() if self.series.own and not self.series.slots else "",
         }
         return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
 
@@ -193,11 +192,6 @@ def sources() -> str:
             if path.suffix in (".py", ".glsl", ".npz"):
                 digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()
-
-
-def auto() -> dict:
-    """What Auto chooses by."""
-    return json.loads((ROOT / "addon" / "frame" / "technique_costs.json").read_text(encoding="utf-8"))["slots"]
 
 
 def in_turns(cells: Iterable[Cell]) -> list[Cell]:

@@ -1,8 +1,7 @@
 """All measurements and the page, one after the other: `python -m bench all`, which `make bench` calls.
 
 Profile and growth of cost come first, each within a part of the budget; time against error gets what is left. Pictures
-are 256x192, or as large as a budget allows for what a page needs. Each step is a process of its own. The table that
-Auto reads is not written: that changes pictures, and is decided by hand (`python -m bench costs`, and then the tests).
+are 256x192, or as large as a budget allows for what a page needs. Each step is a process of its own.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ..snapshot.scene import Snapshot, one_line
-from . import technique_costs
 from .ledger import SKIPPED, Row
 from .light_paths import TRANSPORTS
 from .settings import AUTO, OFF, Settings
@@ -110,20 +109,16 @@ def _check_owners(techniques: list[Technique]) -> None:
 
 
 def _wishes(reasons: dict[Technique, str | None], snapshot: Snapshot, settings: Settings) -> dict[str, str]:
-    """Technique by slot: the one that is set, or, where that is Auto, the one that claims the scene or that the
-    measurements favour.
-    """
+    """Technique by slot: the one that is set, or, where that is Auto, the first that claims the scene, else the first
+    of the registry."""
     able: dict[str, list[Technique]] = {}
     for technique, reason in reasons.items():
         if technique.fills and not reason:  # Auto takes it for its first slot; for others it is chosen by hand
             able.setdefault(technique.fills[0], []).append(technique)
     found = {}
     for slot, techniques in able.items():
-        names = [technique.name for technique in techniques]
-        claimed = [technique.name for technique in techniques if technique.claims(snapshot, settings)]
-        found[slot] = (
-            claimed[0] if claimed else technique_costs.preferred(technique_costs.known(), slot, names, settings.samples)
-        )
+        claimed = (technique for technique in techniques if technique.claims(snapshot, settings))
+        found[slot] = next(claimed, techniques[0]).name
     return found | {slot: wish for slot, wish in settings.slots.items() if wish != AUTO}
 
 

@@ -115,14 +115,6 @@ def test_the_fast_series_sets_what_the_preset_sets_and_sweeps_its_samples():
     assert not any(name.endswith("samples") for name in values)
 
 
-def test_what_auto_knows_is_part_of_the_key_only_where_auto_chooses(monkeypatch):
-    pinned = cell(replace(OWN, slots=(("shadow", "one"),)))
-    before = cell().key("m"), pinned.key("m")
-    monkeypatch.setattr(cells, "auto", lambda: {"shadow": {}})
-    assert cell().key("m") != before[0]
-    assert pinned.key("m") == before[1]
-
-
 def test_a_run_of_some_cells_leaves_the_others_as_they_are():
     def row(scene, samples, seconds):
         return {"scene": scene, "series": {"label": "Candela"}, "samples": samples, "times": [seconds]}

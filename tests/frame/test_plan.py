@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.frame import technique_costs as costs
 from addon.frame.ledger import SKIPPED
 from addon.frame.plan import PlanError, make_plan
 from addon.frame.settings import Settings
 from addon.frame.technique import Technique, Write
-from addon.frame.technique_costs import Cost
 from addon.materials.compiler import default_graph
 from addon.snapshot.scene import Camera, Film, Instance, Light, Material, Mesh, Snapshot, Visibility, World
 from addon.techniques import make_registry
@@ -114,16 +112,15 @@ def test_a_chosen_technique_that_is_not_needed_leaves_the_slot_empty_and_says_so
     }
 
 
-def test_auto_takes_what_the_measurements_favour_at_this_many_samples(monkeypatch):
-    table = {"shadow": {"maps": {1: Cost(1, 1), 64: Cost(1, 1)}, "volumes": {1: Cost(0.4, 1), 64: Cost(3, 1)}}}
-    monkeypatch.setattr(costs, "known", lambda: table)
+def test_auto_takes_the_first_that_claims_the_scene_else_the_first():
     registry = [technique("maps", slot="shadow"), technique("volumes", slot="shadow")]
+    assert names(make_plan(registry, None, Settings())) == ["maps"]
+    registry[1].claims = lambda snapshot, settings: settings.samples == 1
     few = make_plan(registry, None, Settings(samples=1))
     assert names(few) == ["volumes"]
     assert few.skipped[0].reason == "the shadow slot is filled by Volumes"
     assert names(make_plan(registry, None, Settings(samples=64))) == ["maps"]
     assert names(make_plan(registry, None, Settings(samples=1, slots={"shadow": "maps"}))) == ["maps"]
-    assert names(make_plan(registry[:1], None, Settings(samples=1))) == ["maps"]
 
 
 def test_a_technique_that_skips_leaves_its_slot_to_the_next():
