@@ -15,6 +15,7 @@ import numpy as np
 
 from . import final
 from .frame.run import Renderer
+from .frame.schedule import FINAL
 from .frame.settings import Settings
 from .materials.graph import Graph, Input, Node
 from .snapshot.scene import (
@@ -171,7 +172,7 @@ def drawing(renderer: Renderer, parts: Callable, taken: Callable, broken: Callab
 def baked(kind: str, what: int, snapshot: Snapshot, settings: Settings, draw: Draw) -> np.ndarray:
     """(H, W, 4) float32: what a bake of a kind, with these bits of a pass filter, has at the places of a snapshot."""
     values = {**settings.values, **PARAMS}
-    settings = replace(settings, values=values, whole=True, draft=False, time_limit=0.0, noise_threshold=0.0)
+    settings = replace(settings, values=values, schedule=FINAL, time_limit=0.0, noise_threshold=0.0)
     few = replace(settings, samples=min(settings.samples, DATA_SAMPLES))
     if kind == "COMBINED":
         wanted = [f"radiance.{lobe}_{order}" for lobe, bit in LOBES.items() if what & bit

@@ -147,9 +147,10 @@ class Steps:
         """(H, W, 3) the converged picture of a step."""
         from addon import techniques
         from addon.frame.run import Renderer
+        from addon.frame.schedule import FINAL
 
         self._truth = self._truth or Renderer(techniques.make_registry)
-        settings = self.settings(samples=samples, whole=True, seed=77, shows=frozenset())
+        settings = self.settings(samples=samples, schedule=FINAL, seed=77, shows=frozenset())
         snapshot = self.snapshot(number)
         film = replace(snapshot.film, filter_width=POINT)  # drafts show what stands at the middle of each pixel
         return _picture(self._truth, replace(snapshot, film=film), settings, samples)[..., :3]

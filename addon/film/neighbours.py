@@ -72,7 +72,7 @@ def shown_alone(frame: Frame) -> bool:
     pictures before (techniques/history.py) they do so once it is joined."""
     if any(technique.remembers for technique in frame.plan.techniques):
         return False
-    return frame.is_first and (frame.settings.samples == 1 or frame.settings.draft)
+    return frame.is_first and (frame.settings.samples == 1 or frame.settings.schedule.is_draft)
 
 
 def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: str, noisy: bool = False) -> None:
@@ -114,7 +114,7 @@ def shown_sum(frame: Frame, path: str) -> Iterator[images.Image]:
     The sums themselves stay as they are, and the picture of all samples is theirs.
     """
     name = f"radiance.{path}"
-    if frame.settings.whole or frame.settings.draft or frame.samples_done >= min(FEW, frame.settings.samples):
+    if not frame.settings.schedule.shows_each or frame.samples_done >= min(FEW, frame.settings.samples):
         yield frame.to_show(name)
         return
     with ExitStack() as stack:

@@ -24,9 +24,6 @@ window .086 1.1, .054 1.3; four samples, garden .0087 1.4, .0072 1.6; window .02
 | draws | those of the surface pass, two passes of the film and one of this |
 | fetches per pixel | 10 + 4, at edges 9 x 9 |
 
-The six paths of diffuse, glossy and transmitted light are carried over in one pass. Further rows of the table are
-carried in rounds of as many: each as the path of its lobe and order, those of other lobes as diffuse light is.
-
 Bias: at edges, of indirect light, and of direct light where it is not repeated (repeated_light.py), which is that of
 the next pixel on the surface; light's own edges are half a pixel wider. It ends where K = 1.
 """
@@ -135,7 +132,8 @@ def carrier(path: LightPath) -> str:
 
 
 def rounds(paths: tuple[str, ...]) -> list[dict[str, str]]:
-    """Passes that carry `paths`: of each what it carries, by the path as which."""
+    """Passes that carry `paths`: of each what it carries, by the path as which. The six of diffuse, glossy and transmitted light
+    go first; any other goes as that of its lobe and order, those of other lobes as diffuse light does."""
     made = [{path: path for path in paths if path in CARRIERS}]
     for path in FURTHER:
         if path.name in paths:

@@ -189,7 +189,7 @@ class Frame:
         """Sides in pixels of the squares over which lookups of textures average (materials/averages.py). All samples
         of a picture, and their points of the film, share what the pixel filter covers; where any number of samples may
         be shown, sample n takes the n-th of it."""
-        samples = self.settings.samples if self.settings.whole else self.sample + 1
+        samples = self.settings.samples if self.settings.schedule.known_total else self.sample + 1
         side = FOOTPRINT * self.snapshot.film.filter_width * (self.film_points * samples) ** -0.5
         return side, side if self.is_first else 0.0
 

@@ -183,7 +183,7 @@ class Renderer:
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
         settings, profiler = frame.settings, frame.profiler
-        measured = frame.samples_to_draw if settings.whole else 0
+        measured = frame.samples_to_draw if settings.schedule.known_total else 0
         if frame.samples_done == 0:
             with profiler.once(measured):
                 yield from self._begin_samples(frame)
@@ -401,7 +401,7 @@ class Renderer:
         casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
             lights_key(snapshot), self._lamp_maps.changes, casters, self._environment[0], self.materials.fingerprint(),
-            volumes_key(snapshot), settings.bounces, settings.draft,
+            volumes_key(snapshot), settings.bounces, settings.schedule.is_draft,
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple(one.links for one in snapshot.instances if one.links is not NO_LINKS),
@@ -414,9 +414,9 @@ class Renderer:
         return (
             light, snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
-            camera.panorama, settings.seed, settings.shows, settings.whole and settings.samples,
-            settings.whole and (settings.sample_offset, settings.samples_to_draw),
-            settings.whole and (settings.time_limit, settings.noise_threshold),
+            camera.panorama, settings.seed, settings.shows, settings.schedule.known_total and settings.samples,
+            settings.schedule.known_total and (settings.sample_offset, settings.samples_to_draw),
+            settings.schedule.known_total and (settings.time_limit, settings.noise_threshold),
             snapshot.motion and snapshot.motion.key,
             snapshot.baked,
         )  # fmt: skip

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+from .schedule import AT_REST, Schedule
 from .technique import OF_A_PICTURE, Param, Technique
 
 SAMPLES = Param("samples", "Samples", 64, "Number of samples averaged per pixel; error falls as it grows", 1, 65536)
@@ -61,8 +62,7 @@ class Settings:
     slots: dict[str, str] = field(default_factory=dict)
     values: dict[tuple[str, str], object] = field(default_factory=dict)
     passes: tuple[str, ...] | None = None  # names of the techniques of a pass tree, in its order; None: all, by slot
-    whole: bool = False  # only the mean of all samples is shown, so that a sample may leave out what others bring
-    draft: bool = False  # a picture of a moment, in coarse pixels: parameters are at most what they declare for it
+    schedule: Schedule = AT_REST
     sample_offset: int = SAMPLE_OFFSET.default  # `samples` stays the number of the whole picture, for all techniques
     sample_count: int = SAMPLE_COUNT.default
     time_limit: float = TIME_LIMIT.default  # s; the picture may end with fewer samples than it asks for
@@ -81,7 +81,7 @@ class Settings:
     def value(self, owner: str, param: Param):
         """Value of a parameter that the technique named `owner` declares."""
         value = self.values.get((owner, param.name), param.default)
-        return min(value, param.draft) if self.draft and param.draft is not None else value
+        return min(value, param.draft) if self.schedule.is_draft and param.draft is not None else value
 
     @property
     def samples_to_draw(self) -> int:
@@ -101,7 +101,7 @@ class Settings:
 
     def as_draft(self) -> Settings:
         """The same for a picture of a moment. Light of more bounces than four is faint, and costs as much as before."""
-        return replace(self, draft=True, bounces=min(self.bounces, DRAFT_BOUNCES))
+        return replace(self, schedule=self.schedule.as_draft(), bounces=min(self.bounces, DRAFT_BOUNCES))
 
     def with_all_samples(self) -> Settings:
         """The same for a picture that is measured: no slice, and none that ends early."""

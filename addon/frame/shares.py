@@ -107,7 +107,9 @@ class Turns:
         self._names = tuple(names)
         self._light = tuple(name for name in names if name.startswith("radiance."))
         settings = frame.settings
-        self._known = may_rest and settings.whole and not settings.may_end_early and frame.numbers is None
+        self._known = (
+            may_rest and settings.schedule.known_total and not settings.may_end_early and frame.numbers is None
+        )
         self._asks = self._known and settings.samples >= FEWEST_SAMPLES and not _clamped(frame)
 
     def weight(self, frame: Frame, part: int = 0) -> float:

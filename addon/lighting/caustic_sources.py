@@ -69,6 +69,8 @@ def sources_of(frame: Frame, casters: Casters) -> list[MeshSource | WorldSource]
     if MESHES in casters.lights:
         triangles = EmissiveTriangles(frame, ("diffuse",))
         if triangles.power > 0:
-            found.append(MeshSource(triangles, frame.settings.samples if frame.settings.whole else np.inf))
+            found.append(
+                MeshSource(triangles, frame.settings.samples if frame.settings.schedule.known_total else np.inf)
+            )
     bright = caustic_casters.bright_world(frame)
     return found if bright is None else [*found, WorldSource(bright)]

@@ -128,7 +128,7 @@ class LeavingLight:
 
     def draw(self, frame: Frame, points: ScatterPoints, textures: dict[str, images.Image]) -> None:
         """Find what leaves in this sample. `textures`: cell_direct, cell_shapes, scatter_means and walk_lobes."""
-        hierarchy = frame.hierarchy("shadow")
+        hierarchy, settings = frame.hierarchy("shadow"), frame.settings
         owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
         position, normal = points.surface(frame.sample)
         left = [images.pool.take(ROW, points.rows, "RGBA32F") for _ in LEFT]
@@ -144,7 +144,7 @@ class LeavingLight:
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
                 "newest": 1.0 / (self._samples + 1),
-                "walks": 1 if frame.settings.draft else max(FEW_WALKS // frame.settings.samples, LEAST_WALKS),
+                "walks": 1 if settings.schedule.is_draft else max(FEW_WALKS // settings.samples, LEAST_WALKS),
             },
         )  # fmt: skip
         passes.fullscreen(

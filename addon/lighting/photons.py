@@ -207,8 +207,8 @@ class Photons:
         """Views of the lights whose turn it is in this sample, `side` photons along each side. `turn`: how many samples
         had photons before, and how many have in all, where not all samples do and whoever asks weighs them."""
         reflected = (REFLECTED,) if frame.snapshot.film.caustics_reflective else ()
-        alone = frame.settings.whole and frame.settings.samples == 1
-        whole = frame.settings.whole
+        alone = frame.settings.schedule.known_total and frame.settings.samples == 1
+        whole = frame.settings.schedule.known_total
         for emitter, index, count, weight in self._turns(frame, casters, turn):
             bends = casters.refracting and caustic_casters.key_of(emitter) in casters.bent
             lobes = ((REFRACTED,) if bends else ()) + reflected
@@ -242,7 +242,7 @@ class Photons:
             one for one in (*frame.emitters, *self._others)
             if caustic_casters.key_of(one) in casters.lights and not (endless and one.kind == lights.SUN)
         ]  # fmt: skip
-        if not settings.whole or settings.may_end_early:
+        if not settings.schedule.known_total or settings.may_end_early:
             return answered, 1
         return answered, max(1, min(settings.samples, -(-len(answered) * len(casters.low) // VIEWS)))
 
@@ -255,8 +255,17 @@ class Photons:
             return
         for number, emitter in enumerate(answered):
             if frame.sample % rounds == number % rounds:
-                count = len(range(number % rounds, settings.samples, rounds)) if settings.whole else frame.sample + 1
-                yield emitter, frame.sample // rounds, count, settings.samples / count if settings.whole else 1.0
+                count = (
+                    len(range(number % rounds, settings.samples, rounds))
+                    if settings.schedule.known_total
+                    else frame.sample + 1
+                )
+                yield (
+                    emitter,
+                    frame.sample // rounds,
+                    count,
+                    settings.samples / count if settings.schedule.known_total else 1.0,
+                )
 
     def all_at_once(self, frame: Frame, casters: caustic_casters.Casters) -> bool:
         """Whether a sample that has photons has those of all lights."""
@@ -355,7 +364,7 @@ class Photons:
         self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, least_pixels: float
     ) -> tuple[images.Image, ...]:
         """Records of kernels/splats.py for a bundle, at least `least_pixels` pixels of the view `onto` wide."""
-        fall = FALL_KNOWN if frame.settings.whole else FALL_GROWING
+        fall = FALL_KNOWN if frame.settings.schedule.known_total else FALL_GROWING
         target = self._target("_footprints", bundle.side, 4)
         passes.fullscreen(
             FOOTPRINTS,

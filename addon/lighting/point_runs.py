@@ -95,8 +95,8 @@ class PointRuns:
         kinds, exact = _keys(frame)
         key = (self.count, kinds), exact
         # A picture by itself does not depend on those before it: what has moved along is spread anew for it.
-        if key != self._key or (self._moved and frame.settings.whole):
-            follows = self._key is not None and self._key[0] == key[0] and not frame.settings.whole
+        if key != self._key or (self._moved and frame.settings.schedule.may_rebuild):
+            follows = self._key is not None and self._key[0] == key[0] and not frame.settings.schedule.may_rebuild
             before = self._runs if follows else {}
             self._give()
             self._surfaces, self._key, self._moved = Surfaces.of(frame), key, follows

@@ -124,13 +124,13 @@ class SoftMaps(PointMaps):
     def cell(self, frame: Frame, number: int, points: float) -> float:
         if not frame.settings.get(self, "refine"):
             return 1.0
-        if not frame.settings.whole:
+        if not frame.settings.schedule.known_total:
             return float((number + 1) ** -0.5)  # what is shown while it grows has `number` + 1 points up to here
         return float(points**-0.5) if points >= FEWEST_POINTS else 1.0
 
     def part(self, frame: Frame, emitter: lights.Emitter, number: int, points: float) -> lights.Emitter | None:
         """Where the number of points is known and even, parts that tile the light: 2^k points lie in one each."""
-        if not (frame.settings.get(self, "refine") and frame.settings.whole and points == round(points)):
+        if not (frame.settings.get(self, "refine") and frame.settings.schedule.known_total and points == round(points)):
             return None
         return emitter.part(*frame.random_at(number, "light"), round(points))
 

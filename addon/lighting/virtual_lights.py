@@ -207,7 +207,7 @@ class VirtualLights:
             order = choice.order(found["candidate_point"], found["candidate_normal"])
             yield
             pairs = None
-            if frame.settings.bounces > 1 and not frame.settings.draft:
+            if frame.settings.bounces > 1 and not frame.settings.schedule.is_draft:
                 pairs = self._pairs(frame, grid, found, order)
                 held.append(pairs)
                 yield
@@ -280,7 +280,7 @@ class VirtualLights:
         rows = self._light_rows(frame, LAMP_POINTS) if self._emitters else []
         seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
         both = self._emissive is not None and bool(self._world)
-        is_only = frame.settings.whole and frame.settings.samples == 1
+        is_only = frame.settings.schedule.known_total and frame.settings.samples == 1
         share = ONLY_POINTS if is_only and not both else OTHER_POINTS[both]
         total = share * frame.settings.samples
         numbers = range(frame.sample * share, (frame.sample + 1) * share)
@@ -390,7 +390,7 @@ class Grid:
     @classmethod
     def of(cls, frame: Frame, count: int) -> Grid:
         """For `count` virtual lights."""
-        if frame.settings.draft:
+        if frame.settings.schedule.is_draft:
             return cls(DRAFT_PROBES, DRAFT_RAYS)
         return cls(PROBES, max(LEAST_RAYS, -(-CHOICE * count // (PROBES[0] * PROBES[1]))))
 

@@ -224,7 +224,7 @@ def by_rays(
     """Whether rays take the place of maps. `views` makes those of such a map, where they are asked for; without any
     there is no shadow to trace. The ledger's row of the `technique` says why, `of` which light."""
     wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
-    if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
+    if wanted == BY_MAPS or frame.settings.schedule.is_draft or acceleration.too_many(frame.snapshot):
         return False
     if drawn_stochastically(frame) or frame.shared(Layers).of:  # maps ask the material itself; rays know it by cells
         return False
@@ -331,7 +331,7 @@ class DepthMapService:
         """Draws the views; yields now and then where a window waits."""
         alpha = self.alpha_casters(frame, self.layers)
         drawn = depth_maps.draw_views(
-            self._atlas, views, cells, frame.geometry, alpha, frame.sample, lasting=not frame.settings.draft
+            self._atlas, views, cells, frame.geometry, alpha, frame.sample, lasting=not frame.settings.schedule.is_draft
         )
         frame.count(technique, "maps", len(views))
         texels = 0

@@ -63,7 +63,7 @@ PROGRAMS = (WALK, SMOOTH)
 
 def walks_of(frame: Frame) -> int:
     """Of a pixel in a sample."""
-    return 1 if frame.settings.draft else max(FEW_WALKS // frame.settings.samples, 1)
+    return 1 if frame.settings.schedule.is_draft else max(FEW_WALKS // frame.settings.samples, 1)
 
 
 def walk(

@@ -302,9 +302,11 @@ class HierarchyCache:
         )  # fmt: skip
         look = snapshot.meshes, materials, path, maps, glow
         trees = self._kept.get(key)
-        if trees is None and not settings.whole:
-            trees = self._moved(key, look, origin, settings.draft, snapshot.instances)
-        if trees is None or (trees.moved and not settings.draft and (settings.whole or not trees.lasts())):
+        if trees is None and not settings.schedule.may_rebuild:
+            trees = self._moved(key, look, origin, settings.schedule.is_draft, snapshot.instances)
+        if trees is None or (
+            trees.moved and not settings.schedule.is_draft and (settings.schedule.may_rebuild or not trees.lasts())
+        ):
             trees = self._built(shown, key[1], look, origin)
         if self._kept.get(key) is not trees:
             # At most one for each path; the oldest one, of another scene, goes.

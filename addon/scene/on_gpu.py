@@ -17,11 +17,17 @@ if TYPE_CHECKING:
 Kept = TypeVar("Kept")
 
 
+class Scheduled(Protocol):
+    """When a picture is drawn."""
+
+    may_rebuild: bool  # what still serves of pictures before may be made anew
+    is_draft: bool  # it is one of a moving view
+
+
 class Drawn(Protocol):
     """How a picture is drawn."""
 
-    whole: bool  # a picture whose samples are known when it begins
-    draft: bool  # one of a moving view
+    schedule: Scheduled
 
 
 class SceneOnGpu(Protocol):

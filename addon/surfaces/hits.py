@@ -420,9 +420,13 @@ class Hits:
             unknown = {_program_key(frame.materials.compiled[k]) for k in possible} - self._compiled
             if self._asked is None:
                 self._asked = weakref.ref(frame)
-            elif unknown and self._asked() is not frame and (frame.settings.whole or self._ahead is not frame.view):
+            elif (
+                unknown
+                and self._asked() is not frame
+                and (frame.settings.schedule.may_rebuild or self._ahead is not frame.view)
+            ):
                 self._ahead = frame.view  # one for each picture that has to move at once
-                unknown -= unknown if frame.settings.whole else {min(unknown)}
+                unknown -= unknown if frame.settings.schedule.may_rebuild else {min(unknown)}
             if not unknown:
                 if len({frame.materials.leaders[k] for k in possible}) > MOST_UNFLAGGED:
                     self._flag_met(frame, records)

@@ -215,7 +215,7 @@ class ClusteredVisibility(MultiresRadiosity):
         frame.count(self, "clusters", len(groups))
         middle, part = groups.middle, 1.0
         if refine:
-            part = (frame.settings.samples if frame.settings.whole else frame.sample + 1) ** -0.5
+            part = (frame.settings.samples if frame.settings.schedule.known_total else frame.sample + 1) ** -0.5
             if part < 1.0:
                 middle = _drawn_middles(members(groups.label, len(groups)), weight, frame.random("clusters")[0])
         areas = np.zeros((len(groups), AREA_ROWS, 4))

@@ -78,7 +78,7 @@ class Cryptomatte(Technique):
     provides = (Coverage,)
 
     def skip(self, snapshot, settings):
-        if not settings.whole:
+        if not settings.schedule.has_passes:
             return "a viewport shows no passes"
         return None if snapshot.film.cryptomattes else "the view layer asks for no Cryptomatte"
 

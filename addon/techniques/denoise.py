@@ -159,7 +159,7 @@ class Denoise(Technique):
     )
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        if settings.draft:
+        if settings.schedule.is_draft:
             return "it is a draft"
         if not settings.get(self, "strength"):
             return "its strength is 0"

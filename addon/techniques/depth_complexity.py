@@ -157,7 +157,7 @@ class DepthComplexity(EdgeShadows):
 
     def points(self, frame: Frame) -> int:
         mode = frame.settings.get(self, "mode")
-        few = frame.settings.samples < FEW_SAMPLES or frame.settings.draft
+        few = frame.settings.samples < FEW_SAMPLES or frame.settings.schedule.is_draft
         # A share of what a textured lamp gives says nothing of which part of it is hidden.
         if mode == SHARE or (mode == AUTO and few and not any(map(frame.lamp_maps.textured, frame.snapshot.lights))):
             return 0
@@ -173,7 +173,7 @@ class DepthComplexity(EdgeShadows):
             texels, shape = point_patterns(lit.extent, [view.sample for view in views])
         else:
             texels, shape = shared_patterns(frame, lit.extent, points, PATTERNS if several else 1)
-        few = frame.settings.samples < FEW_SAMPLES or frame.settings.draft
+        few = frame.settings.samples < FEW_SAMPLES or frame.settings.schedule.is_draft
         smooth = several and few and frame.settings.get(self, "smooth")
         cards = self.card_words(frame, lit)
         lit.update(shape=shape, point_count=points, pattern_count=len(texels), salt=self.salt(frame))

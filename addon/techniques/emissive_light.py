@@ -157,7 +157,13 @@ class EmissiveLight(Technique):
         patches = provider is not None and provider.serves_every_source(frame)
         # Maps ask the material of a layer itself; rays know it by cells.
         layered = any(material.transparent for material in frame.materials.compiled)
-        if patches or layered or frame.settings.draft or not self._triangles.near or not frame.snapshot.casts_shadows:
+        if (
+            patches
+            or layered
+            or frame.settings.schedule.is_draft
+            or not self._triangles.near
+            or not frame.snapshot.casts_shadows
+        ):
             return None
         if frame.hierarchy("shadow") is None:
             return None
@@ -182,7 +188,7 @@ class EmissiveLight(Technique):
     ) -> LightPoint:
         """A disc of the emissive surface around a point: the area that the picture's points leave to this one."""
         k, point, density = self._triangles.draw(*numbers)
-        points = count * frame.settings.samples if frame.settings.whole else number + 1
+        points = count * frame.settings.samples if frame.settings.schedule.known_total else number + 1
         radius = float(np.sqrt(1.0 / (np.pi * density * points)))
         normal, zero = self._triangles.normal[k], np.zeros(3)
         disc = lights.Emitter(
@@ -201,7 +207,11 @@ class EmissiveLight(Technique):
         points = settings.get(self, "points")
         if self._near is not None:  # a ray of each stands for several points
             return max(points // 2, min(FEWEST_POINTS // 2 // settings.samples, MOST_POINTS // 4))
-        return max(points, min(FEWEST_POINTS // settings.samples, MOST_POINTS)) if settings.whole else points
+        return (
+            max(points, min(FEWEST_POINTS // settings.samples, MOST_POINTS))
+            if settings.schedule.known_total
+            else points
+        )
 
     def release(self) -> None:
         self._maps.release()

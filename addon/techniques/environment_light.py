@@ -296,7 +296,7 @@ class EnvironmentLight(Technique):
         # Maps ask the material of a layer itself; rays know it by cells.
         layered = any(material.transparent for material in frame.materials.compiled)
         told_apart = bright_world(frame) is not None  # a row stands for all directions, and glass stops some of them
-        if useful is None or asked or layered or told_apart or not denoised or not frame.settings.whole:
+        if useful is None or asked or layered or told_apart or not denoised or not frame.settings.schedule.known_total:
             return None
         moments = frame.environment.guide_moments()
         own, shared = world_tiles.variances(useful, moments)
@@ -336,7 +336,7 @@ def _patch(
     radiance: np.ndarray, density: float, shadows: bool,
 ) -> LightPoint:  # fmt: skip
     """The cap of the world around a direction that the picture's directions leave to this one, as a sun."""
-    count = rate.per_sample * frame.settings.samples if frame.settings.whole else number + 1.0
+    count = rate.per_sample * frame.settings.samples if frame.settings.schedule.known_total else number + 1.0
     steradians = min(1.0 / (density * count), WIDEST_PATCH)
     half = float(np.arccos(1.0 - steradians / (2.0 * np.pi)))
     zero = np.zeros(3)

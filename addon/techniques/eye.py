@@ -231,7 +231,7 @@ class EyeModel(Technique):
         """Texels along each side of the pattern: the least and the most."""
         side = settings.get(self, "side")
         found = (LEAST_SIDE, MOST_SIDE) if side == AUTO else (int(side), int(side))
-        return tuple(min(one, DRAFT_SIDE) for one in found) if settings.draft else found
+        return tuple(min(one, DRAFT_SIDE) for one in found) if settings.schedule.is_draft else found
 
     def show(self, frame: Frame) -> None:
         frame.provide(self._service)

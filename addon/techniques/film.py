@@ -166,7 +166,7 @@ class Film(Technique):
 
     def looks_at(self, settings: Settings) -> tuple[str, ...]:
         # A viewport at rest shows its first samples filtered (film/neighbours.py).
-        filtered = () if settings.whole or settings.draft else ("radiance.diffuse_indirect", "color.diffuse")
+        filtered = ("radiance.diffuse_indirect", "color.diffuse") if settings.schedule.shows_each else ()
         return (*filtered, *clamping.CLAMPED) if clamping.limits(settings, self) else filtered
 
     def begin(self, frame: Frame) -> None:
@@ -223,7 +223,7 @@ class Film(Technique):
 
     def _first_seen(self, frame: Frame) -> None:
         """What passes ask for of the surfaces in the first sample, as Cycles has it: depth, positions and indices."""
-        film, mode, whole = frame.snapshot.film, data_mode(frame), frame.settings.whole
+        film, mode, whole = frame.snapshot.film, data_mode(frame), frame.settings.schedule.has_passes
         anew = whole and mode != STOCHASTIC and (film.position or frame.is_apart("film.depth"))
         position = frame.images["surface.position"]
         with ExitStack() as stack:

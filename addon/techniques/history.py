@@ -103,9 +103,9 @@ class History(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if snapshot.camera is not None and snapshot.camera.panorama is not None:
             return "places are not looked up in pictures of panoramic cameras"
-        if settings.draft:
+        if settings.schedule.is_draft:
             return None if settings.get(self, "drafts") else "it is off for moving views"
-        if not settings.whole:
+        if settings.schedule.shows_each:
             return "the picture is at rest"
         if not settings.get(self, "animation"):
             return "it is off in final pictures"
@@ -134,7 +134,7 @@ class History(Technique):
                 blocks={"film_view": frame.view_block},
                 constants={"most_still": float(MANY), "most_moved": float(FEW)},
             )  # fmt: skip
-            if frame.settings.samples == 1 or frame.settings.draft:
+            if frame.settings.samples == 1 or frame.settings.schedule.is_draft:
                 self._filtered(frame, indirect)
             for path, found in zip(PATHS, (direct, indirect)):
                 passes.copy(found.colors[0], frame.target(path))

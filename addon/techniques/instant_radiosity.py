@@ -152,7 +152,10 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
     bindings["textures"]["virtual_lights"] = lights.image
     near = near_radius(frame, lights.wanted)
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
-    bindings["constants"] |= {"deeper": deeper_weight(frame), "lobe_rays": 1 if frame.settings.draft else LOBE_RAYS}
+    bindings["constants"] |= {
+        "deeper": deeper_weight(frame),
+        "lobe_rays": 1 if frame.settings.schedule.is_draft else LOBE_RAYS,
+    }
     bindings["constants"]["shaded_roughness"] = shaded_roughness(frame)
     frame.provide(GatherBindings(bindings))
     return bindings
@@ -165,7 +168,7 @@ def deeper_weight(frame: Frame) -> float:
     Pictures of few samples, and those that are shown while they grow, have it in each.
     """
     samples = frame.settings.samples
-    if not frame.settings.whole or samples < 4 * DEEPER or samples % DEEPER:
+    if not frame.settings.schedule.known_total or samples < 4 * DEEPER or samples % DEEPER:
         return 1.0
     chosen = DEEPER_ORDER[frame.sample // DEEPER % len(DEEPER_ORDER)]
     return float(DEEPER) if frame.sample % DEEPER == chosen else 0.0
@@ -222,13 +225,13 @@ class InstantRadiosity(Technique):
         """Noise of the choice is that of the pixel alone, and averages out over samples while that of the virtual
         lights, which all pixels share, is still there."""
         rays, settings = frame.settings.get(self, "rays"), frame.settings
-        return rays if settings.draft else max(rays, -(-MORE_RAYS * rays // settings.samples))
+        return rays if settings.schedule.is_draft else max(rays, -(-MORE_RAYS * rays // settings.samples))
 
     def _reach(self, frame: Frame, count: int) -> dict[str, float]:
         """Up to where rays look for light, m: those of all pixels, and those behind glossy lobes. What they find is
         grain, which a mean over neighbours takes out; what virtual lights leave is not."""
         near = near_radius(frame, count)
-        several = frame.settings.samples >= SEVERAL and not frame.settings.draft
+        several = frame.settings.samples >= SEVERAL and not frame.settings.schedule.is_draft
         far = FARTHER * frame.typical_distance
         return {"near_radius": far if several else near, "glossy_radius": near}
 

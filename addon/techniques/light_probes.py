@@ -96,7 +96,7 @@ class LightProbes(Technique):
         if not _lit(snapshot.world):
             if not any(np.any(light.strength) for light in snapshot.lights):
                 return "the scene has no light to look for"
-            if not settings.whole:
+            if not settings.schedule.may_measure:
                 return "every sample is shown, so each has one point per light"
         return acceleration.too_many(snapshot)
 
@@ -104,7 +104,7 @@ class LightProbes(Technique):
         # All is drawn before the first of it is read, and nothing yet known of the receivers.
         lit = _lit(frame.snapshot.world)
         guided = self._draw_guide(frame) if lit and frame.settings.get(self, "guiding") else None
-        shares = frame.settings.whole and frame.settings.get(self, "maps") > 0
+        shares = frame.settings.schedule.may_measure and frame.settings.get(self, "maps") > 0
         trials = self._draw_trials(frame, lit) if shares else []
         if lit and guided is None:
             frame.environment.guide(None)
@@ -132,7 +132,7 @@ class LightProbes(Technique):
         rays = self._rays(frame)
         rows, columns = environment.GUIDE_ROWS, environment.GUIDE_COLUMNS
         affordable = FEW * frame.size[0] * frame.size[1] * frame.settings.samples / (rows * columns)
-        fine = frame.settings.whole and affordable >= FINE_PROBES[0] * FINE_PROBES[1]
+        fine = frame.settings.schedule.may_measure and affordable >= FINE_PROBES[0] * FINE_PROBES[1]
         grid = FINE_PROBES if fine else GUIDE_PROBES
         image = images.pool.take(rows * columns, grid[0] * grid[1], "RG32F")
         passes.fullscreen(

@@ -170,7 +170,7 @@ GATHERS_SHARED = (shared_gather_program(-1, True, True), shared_gather_program(0
 def pixels_shown_alone(snapshot: Snapshot, settings: Settings) -> int:
     """How many pixels a picture of one sample has; 0 if more samples follow, or if it is a draft."""
     width, height = snapshot.film.border_size
-    return width * height if settings.samples == 1 and not settings.draft else 0
+    return width * height if settings.samples == 1 and not settings.schedule.is_draft else 0
 
 
 class MultiresRadiosity(InstantRadiosity):

@@ -234,7 +234,9 @@ class ShadedReflections(Technique, BothWays):
         if settings.bounces == 0:
             return "the scene's bounces are set to 0"
         if settings.get(self, "bounces") == 0:
-            return "drafts show mean colours in reflections" if settings.draft else "its bounces are set to 0"
+            return (
+                "drafts show mean colours in reflections" if settings.schedule.is_draft else "its bounces are set to 0"
+            )
         return acceleration.too_many(snapshot)
 
     def begin(self, frame: Frame) -> None:

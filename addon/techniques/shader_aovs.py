@@ -51,7 +51,7 @@ class ShaderAovs(Technique):
     provides = (SurfaceValues,)
 
     def skip(self, snapshot, settings):
-        if not settings.whole:
+        if not settings.schedule.has_passes:
             return "a viewport shows no passes"
         return None if snapshot.film.aovs else "the view layer asks for no AOV, no UV, Vector or denoising data"
 

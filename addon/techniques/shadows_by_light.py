@@ -106,7 +106,7 @@ class ShadowsByLight(PointMaps):
         self._kinds: dict[str, str] = {}
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
-        if settings.samples > 1 or settings.draft or not settings.get(self, "soft_maps"):
+        if settings.samples > 1 or settings.schedule.is_draft or not settings.get(self, "soft_maps"):
             return False
         return any(has_extent(light) for light in snapshot.lights)
 

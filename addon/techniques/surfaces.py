@@ -171,7 +171,7 @@ def _receivers_key(frame: Frame, modes: tuple[int, ...]) -> tuple:
     return (
         frame.size, modes, frame.snapshot.baked, camera.matrix.tobytes(), camera.kind, camera.frame,
         camera.clip_start, camera.clip_end, camera.aperture, camera.panorama, frame.snapshot.film, settings.seed,
-        settings.draft, refracts(frame),
+        settings.schedule.is_draft, refracts(frame),
         frame.geometry.changes, frame.geometry.origin.tobytes(), frame.materials.fingerprint(),
         tuple(sorted(settings.values.items())), tuple(technique.name for technique in frame.plan.techniques),
         frame.snapshot.own_values,

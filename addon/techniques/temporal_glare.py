@@ -156,7 +156,7 @@ class TemporalGlare(Technique):
 
     def _unseen(self, frame: Frame, reason: str) -> str:
         """The picture is shown as it is; a render pass of the lens has to be the same."""
-        if frame.settings.whole:
+        if frame.settings.schedule.has_passes:
             passes.copy(frame.images[COMBINED], frame.target(LENS))
         return reason
 

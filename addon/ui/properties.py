@@ -7,6 +7,7 @@ from math import floor, log10
 
 import bpy
 
+from ..frame.schedule import AT_REST, FINAL
 from ..frame.settings import (
     AUTO,
     BOUNCES,
@@ -322,7 +323,7 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
     alone = not (viewport or preview or group.sample_offset or group.sample_count)  # a whole picture, by one machine
     settings = Settings(
         samples=samples,
-        whole=not viewport,
+        schedule=AT_REST if viewport else FINAL,
         seed=group.seed,
         bounces=group.bounces,
         sample_offset=0 if viewport or preview else group.sample_offset,

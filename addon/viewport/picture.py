@@ -377,7 +377,7 @@ class Viewport:
         if self.ahead is not None and self.was_whole:
             self.renderer.waits = lambda *_: None
         elif self.ahead is not None:
-            self.renderer.waits = lambda _, drawn: self._waits_for(whole, settings, drawn.draft)
+            self.renderer.waits = lambda _, drawn: self._waits_for(whole, settings, drawn.schedule.is_draft)
         drawn = drawn_with(settings, scale, scale == 1 or why == CLIMBS)
         parts = self.renderer.beginning(replace(whole, film=coarser(film, scale)), drawn)
         self._beginning = Beginning(parts, camera, size, border, scale, why, settings.samples, reading)

@@ -73,7 +73,7 @@ def test_triangle_that_is_not_finite_is_left_out_and_not_moved(triangles):
 def seen_by(snapshot):
     """What a hierarchy asks of a draft's frame."""
     return SimpleNamespace(
-        snapshot=snapshot, geometry=SimpleNamespace(origin=np.zeros(3)), settings=Settings(draft=True, whole=False),
+        snapshot=snapshot, geometry=SimpleNamespace(origin=np.zeros(3)), settings=Settings().as_draft(),
         measured_materials=[compile_material(one.name, one.graph) for one in snapshot.materials],
         opacity_maps=OpacityMaps(), emission_maps=EmissionMaps(), blocker_sets=(),
     )  # fmt: skip

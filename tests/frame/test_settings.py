@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from addon.frame.schedule import AT_REST
 from addon.frame.settings import SAMPLES, Settings
 from addon.frame.technique import Param, Technique
 from addon.techniques import make_registry
@@ -141,7 +142,7 @@ class Drafted(Technique):
 def test_a_draft_takes_at_most_what_is_declared_for_it(count, drawn):
     settings = Settings(values={("drafted", "count"): count}).as_draft()
     assert settings.of(Drafted()) == (drawn, False, 0.5)
-    assert replace(settings, draft=False).of(Drafted()) == (count, True, 0.5)
+    assert replace(settings, schedule=AT_REST).of(Drafted()) == (count, True, 0.5)
 
 
 @pytest.mark.parametrize(("bounces", "drawn"), [(0, 0), (1, 1), (16, 4)])

@@ -8,6 +8,7 @@ import pytest
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.frame.schedule import DRAFT, FINAL
 from addon.frame.settings import Settings
 from addon.snapshot.scene import Film
 from addon.techniques.clustered_visibility import ClusteredVisibility
@@ -145,7 +146,9 @@ def test_maps_are_kept_while_nothing_in_them_changes(stage, render):
 )
 def test_auto_takes_it_for_single_samples_of_many_pixels(size, samples, draft, taken):
     film = Film(*size, (0, 0, *size))
-    claimed = ClusteredVisibility().claims(SimpleNamespace(film=film), Settings(samples=samples, draft=draft))
+    claimed = ClusteredVisibility().claims(
+        SimpleNamespace(film=film), Settings(samples=samples, schedule=DRAFT if draft else FINAL)
+    )
     assert claimed == taken
 
 

@@ -8,6 +8,8 @@ import pytest
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.frame.schedule import AT_REST, DRAFT, FINAL
+from addon.frame.settings import Settings
 from addon.gfx import images
 from addon.sampling.sequence import point
 from addon.surfaces.reflectance import BANDS, COLUMNS, Reflectance
@@ -289,7 +291,7 @@ def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_
 
 @pytest.mark.parametrize(("samples", "whole"), [(1, True), (3, True), (64, False), (4, True), (30, True), (64, True)])
 def test_light_between_close_surfaces_counts_once_in_the_mean(samples, whole):
-    frame = SimpleNamespace(settings=SimpleNamespace(samples=samples, whole=whole), sample=0)
+    frame = SimpleNamespace(settings=Settings(samples, schedule=FINAL if whole else AT_REST), sample=0)
     weights = []
     for frame.sample in range(samples):
         weights.append(deeper_weight(frame))
@@ -299,7 +301,7 @@ def test_light_between_close_surfaces_counts_once_in_the_mean(samples, whole):
 
 def test_samples_that_look_for_it_have_numbers_from_all_quarters():
     """Every other sample alone has numbers from one half of the sequence."""
-    frame = SimpleNamespace(settings=SimpleNamespace(samples=16, whole=True), sample=0)
+    frame = SimpleNamespace(settings=Settings(16, schedule=FINAL), sample=0)
     chosen = []
     for frame.sample in range(16):
         if deeper_weight(frame):
@@ -312,7 +314,7 @@ def test_pictures_of_few_samples_trace_more_of_the_virtual_lights():
     technique = InstantRadiosity()
 
     def rays(samples, draft=False, asked=2):
-        settings = SimpleNamespace(samples=samples, draft=draft, get=lambda *name: asked)
+        settings = SimpleNamespace(samples=samples, schedule=DRAFT if draft else FINAL, get=lambda *name: asked)
         return technique._rays(SimpleNamespace(settings=settings))
 
     assert [rays(samples) for samples in (1, 2, 3, 4, 64)] == [8, 4, 3, 2, 2]

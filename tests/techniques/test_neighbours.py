@@ -7,6 +7,8 @@ import pytest
 
 from addon.compare.passes import light_paths
 from addon.film.neighbours import FEW, shown_sum, smooth
+from addon.frame.schedule import AT_REST, FINAL
+from addon.frame.settings import Settings
 from addon.gfx import images
 from addon.gfx.struct import Block
 from addon.scene.view import VIEW
@@ -35,7 +37,7 @@ def frame_of(gpu_context):
         values |= {"eye": (0, 0, 5, 1), "frame": (-SPAN / 2, SPAN / 2) * 2, "film": (SIZE, SIZE, 0.1, 100)}
         frame = SimpleNamespace(
             size=(SIZE, SIZE), is_first=True, samples_done=1,
-            settings=SimpleNamespace(samples=samples, draft=samples == 1, whole=whole),
+            settings=Settings(samples, schedule=FINAL if whole else AT_REST),
             plan=SimpleNamespace(techniques=()),
             images={name: images.upload(np.dstack(layer).astype(np.float32)) for name, layer in layers.items()},
             view_block=Block(VIEW, **values), count=lambda *counter: None,

@@ -23,7 +23,7 @@ class Slow:
         self.ready, self.asked = set(), []
 
     def left(self, renderer, whole, settings, draft):
-        self.asked.append((whole.film.width, whole.film.height, settings.draft))
+        self.asked.append((whole.film.width, whole.film.height, settings.schedule.is_draft))
         return None if (DRAFT if draft else FULL) in self.ready else 5
 
 
