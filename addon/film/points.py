@@ -132,8 +132,8 @@ def carrier(path: LightPath) -> str:
 
 
 def rounds(paths: tuple[str, ...]) -> list[dict[str, str]]:
-    """Passes that carry `paths`: of each what it carries, by the path as which. The six of diffuse, glossy and transmitted light
-    go first; any other goes as that of its lobe and order, those of other lobes as diffuse light does."""
+    """Passes that carry `paths`: of each what it carries, by the path as which. The six of diffuse, glossy and
+    transmitted light go first; any other as that of its lobe and order, those of other lobes as diffuse light."""
     made = [{path: path for path in paths if path in CARRIERS}]
     for path in FURTHER:
         if path.name in paths:
