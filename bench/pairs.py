@@ -1,12 +1,13 @@
 """Features that meet, beside Cycles: `python -m bench pairs`.
 
-Every pair of the features of bench/pair_features.py is drawn in one small room by Candela, with 1 and with 16 samples
-and all bounces, and by Cycles, whose pictures are kept by content. Judged are the ratio of means and relMSE of means
-over 4x4 pixels, which noise of single pixels hardly moves:
+Every pair of the features of bench/pair_features.py and bench/pair_settings.py is drawn in one small room by Candela,
+with 1 and with 16 samples and all bounces, and by Cycles, whose pictures are kept by content. Judged are the ratio of
+means and relMSE of means over 4x4 pixels, which noise of single pixels hardly moves. With 1 sample all light passes are
+drawn apart and must add up to the picture where Cycles' do; with 16 the picture is drawn alone.
 
     green   within the bounds of its number of samples, to which the reference's own noise is added
     amber   beyond them, and a sentence said that something is drawn otherwise
-    red     beyond them without a word, or no picture, or values that are not finite
+    red     beyond them without a word, or no picture, or values that are not finite, or passes that do not add up
 
 Results go to out/pairs.json as they come; another run goes on with what is missing. `--triples N` draws N triples at
 random instead. `--page` writes docs/pairs.md and its picture.
@@ -24,15 +25,17 @@ from pathlib import Path
 
 import numpy as np
 
+from bench import ages, pair_features, pair_settings  # noqa: F401  (they name the features)
 from bench.cells import ROOT
 from bench.markdown import begin, put_between, table, write_whole
-from bench.pair_features import FEATURES, Room
+from bench.pair_room import FEATURES, Room
 
 COMMAND = "python -m bench pairs"
 RESULTS, PAGE, PICTURE = ROOT / "out" / "pairs.json", ROOT / "docs" / "pairs.md", ROOT / "docs" / "images" / "pairs.png"
-SIZE, REFERENCE_SAMPLES, BLOCK = (48, 36), 384, 4
+SIZE, REFERENCE_SAMPLES, BLOCK = (48, 36), 128, 4
 BOUNDS = {1: (0.10, 0.10), 16: (0.03, 0.02)}  # by samples: how far the ratio of means is from 1, relMSE of blocks
 GREEN, AMBER, RED = "green", "amber", "red"
+APART = 0.01  # of the mean: how far the sum of passes may be from the picture beyond what it is for Cycles
 DARK = 0.1  # of the mean luminance: below it, errors count as absolute
 
 
@@ -106,7 +109,7 @@ def chosen(options: argparse.Namespace) -> list[tuple[str, ...]]:
 
 def measure(stage, names: tuple[str, ...], samples: list[int], keep: Path | None = None) -> dict[str, dict]:
     """By number of samples: error of the picture in which these features meet, or why there is none."""
-    from addon.compare.reference import reference, render_passes
+    from addon.compare.reference import combined_alone, reference, render_passes
     from addon.frame import ledger
 
     found: dict[str, dict] = {}
@@ -118,24 +121,53 @@ def measure(stage, names: tuple[str, ...], samples: list[int], keep: Path | None
     except Exception:
         traceback.print_exc()
         return {str(n): {"failed": "the scene or its reference: " + traceback.format_exc(limit=1)} for n in samples}
+    commit = ages.git("rev-parse", "--short=10", "HEAD") or ""
     pixels, half = truth.images["combined"][..., :3], truth.half["combined"][..., :3]
     for n in samples:
         started = resource.getrusage(resource.RUSAGE_SELF)
+        extra = combined_alone(room.layer) if n > 1 else []
         try:
-            own = render_passes(room.scene, "CANDELA", n, 1, size=SIZE).images["combined"][..., :3]
+            drawn = render_passes(room.scene, "CANDELA", n, 1, size=SIZE, extra=extra)
         except Exception as error:
             found[str(n)] = {"failed": str(error) or type(error).__name__}
             continue
         spent = resource.getrusage(resource.RUSAGE_SELF)
-        found[str(n)] = judged(own, pixels, half, n) | {
-            "notes": [str(note) for note in ledger.latest().notes],
-            "seconds": spent.ru_utime - started.ru_utime,
-        }
+        own = drawn.images["combined"][..., :3]
+        wrong = [said for check in room.checks if (said := of_check(check, drawn.layers))]
+        if n == 1 and (off := sum_of_passes(drawn.images)) > sum_of_passes(truth.images) + APART:
+            wrong.append(f"the light passes differ from the picture by {off:.3f} of its mean")
+        found[str(n)] = (
+            judged(own, pixels, half, n)
+            | ({"failed": "; ".join(wrong)} if wrong else {})
+            | {
+                "commit": commit,
+                "notes": [str(note) for note in ledger.latest().notes],
+                "seconds": spent.ru_utime - started.ru_utime,
+            }
+        )
         if keep is not None:
             from bench.cases import write_pictures
 
             write_pictures(keep, f"{key(names).replace(' ', '_')}_{n}", own, pixels)
     return found
+
+
+def of_check(check, layers: dict[str, np.ndarray]) -> str:
+    """What is wrong of a picture's layers, a missing one, too."""
+    try:
+        return check(layers)
+    except KeyError as missing:
+        return f"the file has no layer {missing}"
+
+
+def sum_of_passes(images: dict[str, np.ndarray]) -> float:
+    """How far the light of all paths together is from the picture, of its mean."""
+    from addon.compare.passes import light_paths
+    from addon.frame.light_paths import LIGHT_PATHS
+
+    paths, whole = light_paths(images), images["combined"][..., :3]
+    total = sum(paths[path.name] for path in LIGHT_PATHS if path.name in paths)
+    return float(np.abs(total - whole).mean()) / max(float(np.abs(whole).mean()), 1e-6)
 
 
 def judged(own: np.ndarray, truth: np.ndarray, half: np.ndarray, samples: int) -> dict:

@@ -96,6 +96,7 @@ class Passes:
     seconds: float  # wall time of the render, without writing and reading the file
     film_transparent: bool = False
     notes: tuple[str, ...] = field(default=())
+    layers: dict[str, np.ndarray] = field(default_factory=dict)  # everything in the file, by its name there
 
     @property
     def size(self) -> tuple[int, int]:

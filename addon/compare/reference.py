@@ -94,10 +94,13 @@ def render_passes(
             if "FINISHED" not in state:
                 raise RenderFailed(f"The render of scene '{scene.name}' by {engine} was cancelled.")
             _save_render_result(scene, path)
-        images = named_images(read_exr(path), view_layer.name)
+        layers = read_exr(path)
+        images = named_images(layers, view_layer.name)
     if "combined" not in images:
         raise RenderFailed(f"{engine} left no picture of view layer '{view_layer.name}' in scene '{scene.name}'.")
-    return Passes(images, engine, samples, seed, seconds, transparent, tuple(notes))
+    prefix = view_layer.name + "."
+    layers = {name.removeprefix(prefix): pixels for name, pixels in layers.items()}
+    return Passes(images, engine, samples, seed, seconds, transparent, tuple(notes), layers)
 
 
 def named_images(layers: dict, view_layer: str) -> dict:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench import pairs
-from bench.pair_features import FEATURES
+from bench.pair_room import FEATURES
 
 FEW = 8  # of the pairs, drawn anew where features are added
 STILL_WRONG = {"fog in a box"}  # alone: see docs/pairs.md
