@@ -390,7 +390,9 @@ class Renderer:
             for k in shown
             if self.materials.compiled[k].tinted or self.materials.compiled[k].added
         ]
-        wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
+        wanted += [self.materials.layer_program(k) for k in shown if k in self.materials.layers_in_order]
+        if not self.materials.layers_in_order:
+            wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
         if plan.fills("subsurface"):
             wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
         return list(dict.fromkeys(wanted))

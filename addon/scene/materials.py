@@ -171,6 +171,14 @@ class MaterialSet:
         return self._view
 
     @property
+    def layers_in_order(self) -> frozenset[int]:
+        """Materials whose layers are taken apart, so that what one emits has the colours of those before it: all that
+        emit or are coloured, where there are both."""
+        glowing = {k for k, one in enumerate(self.compiled) if one.glows}
+        colored = {k for k, one in enumerate(self.compiled) if one.tinted or one.added}
+        return frozenset(glowing | colored) if glowing and colored else frozenset()
+
+    @property
     def soft(self) -> bool:
         """Some material has a lobe of shaders/lib/soft_lobe.glsl, so that programs which light surfaces need it."""
         return any(compiled.soft for compiled in self.compiled)
@@ -218,6 +226,10 @@ class MaterialSet:
     def glow_program(self, index: int) -> Program:
         """Adds what layers of material `index` emit that this sample passes."""
         return _glow_program(self.compiled[index])
+
+    def layer_program(self, index: int) -> Program:
+        """Draws the farthest layer of material `index` that this sample passes (surfaces/layers.py)."""
+        return _layer_program(self.compiled[index])
 
     def caster_program(self, index: int) -> Program:
         """Draws material `index`, which has alpha, into a depth map."""
@@ -509,6 +521,16 @@ def _glow_program(compiled: CompiledMaterial) -> Program:
         fragment="surface/glow.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
         defines=(*CAMERA_DEFINES, *AVERAGING_DEFINES, *_own_defines(compiled)),
+    )
+
+
+@_once
+def _layer_program(compiled: CompiledMaterial) -> Program:
+    return replace(
+        _tint_program(compiled),
+        name=f"layer {compiled.program_key[:8]}",
+        fragment="surface/layer.frag.glsl",
+        outputs=tuple(("VEC4", f"out_{name}") for name in ("position", "tint", "emission")),
     )
 
 

@@ -18,6 +18,7 @@ from ..scene.culling import calls, entered
 from ..scene.joint_draws import Joint, JointDraws
 from ..scene.materials import FIRST_VALUE, SURFACE_IMAGES, AovLayout
 from ..scene.view import VIEW
+from .layers import add_in_order
 from .tiles import clear_outside, draw_seen
 
 STOCHASTIC, OPAQUE, LEFT_OUT, FROM_OPACITY = 0, 1, 2, 3
@@ -197,8 +198,17 @@ def add_glow(frame: Frame, technique: Technique, position: images.Image, emissio
     if not glowing:
         return
     constants = {"glass_bends": int(refracts(frame))}
+    layers = frame.materials.layers_in_order
 
     def draw(target: images.Target, view: Block, rows: np.ndarray, position: images.Image) -> None:
+        if layers:
+
+            def submit(behind: images.Image) -> None:
+                read = {"surface_position": behind}
+                _submit(frame, technique, frame.materials.layer_program, layers, constants, view, rows, read)
+
+            frame.count(technique, "passes", add_in_order(target, position, submit))
+            return
         with passes.drawing(target, blend="ADDITIVE_PREMULT", depth_test="NONE", depth_write=False):
             textures = {"surface_position": position}
             _submit(frame, technique, frame.materials.glow_program, glowing, constants, view, rows, textures)

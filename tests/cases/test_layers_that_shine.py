@@ -49,9 +49,8 @@ def background(stage):
     stage.camera_above()
 
 
-# Not over one another where they are coloured: what shines behind a coloured layer keeps its colour (docs/nodes.md).
 @pytest.mark.parametrize(
-    ("clear", "over"), [(CLEAR, False), (CLEAR, True), (DARK, False), (DARK, True), (TINTED, False)]
+    ("clear", "over"), [(CLEAR, False), (CLEAR, True), (DARK, False), (DARK, True), (TINTED, False), (TINTED, True)]
 )
 def test_emission_added_to_transparency_is_drawn(stage, beside, clear, over):
     background(stage)
@@ -61,6 +60,26 @@ def test_emission_added_to_transparency_is_drawn(stage, beside, clear, over):
         stage.rectangle((-2, -2), (2, 2), -2.0, material=layered(stage, ADD, CLEAR, FIRE))
     own, cycles = beside(16)
     agree(corner_means(own["combined"]), corner_means(cycles["combined"]))
+
+
+@pytest.mark.parametrize("count", [2, 6])
+def test_what_shines_behind_coloured_layers_has_their_colours(stage, count):
+    """A stack of layers that are drawn in one call, by its closed form, exact with one sample; layers nearer than the
+    fourth from behind colour what is farther, but not each other."""
+    stage.camera_above()
+    material = layered(stage, ADD, FIRE, TINTED)
+    for k in range(count):
+        stage.rectangle((-3, -3), (3, 3), 0.3 * ((5 * k) % count), material=material)
+    tint, fire = np.array([0.2, 0.9, 0.6]), np.array([1.5, 0.6, 0.15])
+    if count > 4:  # faint ones, so that what is left out of order is small
+        tree = material.node_tree
+        tree.nodes["Transparent BSDF"].inputs["Color"].default_value = (0.9, 0.98, 0.95, 1)
+        tint = np.array([0.9, 0.98, 0.95])
+    seen = np.zeros(3)
+    for _ in range(count):
+        seen = seen * tint + fire
+    found = stage.render(128)["combined"][..., :3].mean((0, 1))
+    assert np.allclose(found, seen, rtol=0.03), found / seen
 
 
 def test_the_film_stays_transparent_behind_a_flame(stage, beside):

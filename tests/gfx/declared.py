@@ -62,6 +62,7 @@ def relief_programs() -> list[Program]:
     shell = replace(lifted, own_surface=displacement.relief_surface(lifted), program_key=f"r{lifted.program_key}")
     drawn = (materials._surface_program, materials._caster_program, materials._tint_program, materials._lobe_program)
     drawn = (*drawn, materials._scatter_program, materials._glow_program, materials._emission_program)
+    drawn = (*drawn, materials._layer_program)
     return [displacement.displacement_program(lifted), *(program(shell) for program in drawn)]
 
 
@@ -77,6 +78,7 @@ def programs() -> list[Program]:
     files = sorted({entry.include for entry in nodes.REGISTRY if entry.include})
     made = [*_found(Program), materials._tint_program(plain), bake_program(plain), background_program(plain)]
     made += [materials._scatter_program(plain), materials._glow_program(plain), materials._emission_map_program(plain)]
+    made += [materials._layer_program(plain)]
     made += [materials._lobe_program(plain), hit_program(plain), media.bake_program(fog(), ("density",))]
     made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
     made += [grass_program(materials._surface_program(plain)), answered(lighting(HARD, False), (GRASS,))]
