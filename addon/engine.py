@@ -32,7 +32,7 @@ from .snapshot.scene import Note, Snapshot, one_line
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
-from .ui.passes import cryptomatte_metadata, missing_passes, wanted_passes
+from .ui.passes import cryptomatte_metadata, missing_passes, render_metadata, wanted_passes
 from .ui.properties import settings_of
 
 MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and images stay for their next picture
@@ -244,6 +244,8 @@ class CandelaEngine(bpy.types.RenderEngine):
                 _fill(result, name, eye, array)
             seen = (order.snapshot, *(order.moments.snapshots if order.moments is not None else ()))
             for name, text in cryptomatte_metadata(seen, layer.name).items():
+                self.get_result().stamp_data_add_field(name, text)
+            for name, text in render_metadata(layer.name, ledger, time.perf_counter() - started).items():
                 self.get_result().stamp_data_add_field(name, text)
             self.end_result(result)
             self._tell(FINISHED, None, layer.name, eye)

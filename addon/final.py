@@ -28,7 +28,7 @@ from .snapshot.light_groups import parts_of
 from .snapshot.scene import Note, Snapshot
 from .snapshot.shutter import Moments
 from .ui import light_groups
-from .ui.passes import CAMERA_AXES, CATCHER, GLARE, RenderPass
+from .ui.passes import CAMERA_AXES, CATCHER, GLARE, NOISY, RenderPass
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 TAIL = 0.5  # the same, about
@@ -356,12 +356,25 @@ def images_of(wanted: list[RenderPass], more: tuple[str, ...] = ()) -> set[str]:
     return light_groups.frame_images(sources)
 
 
+def _noisy(frame: Frame, combined: np.ndarray) -> np.ndarray:
+    """(H, W, 4) the picture without what Denoise has made of its light."""
+    noisy = combined.copy()
+    for path in LIGHT_PATHS:
+        if path.image in frame.shown and path.image != frame.shown[path.image]:
+            own, shown = (images.read(one) for one in (frame.images[f"film.{path.name}"], frame.to_show(path.image)))
+            change = np.nan_to_num(own[..., :3] - shown[..., :3], posinf=0.0, neginf=0.0)
+            noisy[..., :3] += frame.snapshot.film.exposure / max(frame.samples_done, 1) * change
+    return noisy
+
+
 def mean_images(
     renderer: Renderer, frame: Frame, wanted: list[RenderPass], more: tuple[str, ...] = ()
 ) -> dict[str, np.ndarray]:
     """Mean images of a frame that passes are made from."""
     renderer.show(frame)
-    arrays = renderer.finish(frame, sorted(images_of(wanted, more)))
+    arrays = renderer.finish(frame, sorted(images_of(wanted, more) - {NOISY.source}))
+    if NOISY in wanted:
+        arrays[NOISY.source] = _noisy(frame, arrays[COMBINED])
     if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
         arrays[GLARE.source] = arrays[COMBINED]
     return arrays

@@ -35,6 +35,7 @@ PASS_NAMES = (
 # Named where a view layer asks for them; no comparison switches them on.
 OTHER_NAMES = (
     PassName("shadow_catcher", "Shadow Catcher", "Shadow Catcher", "cycles.use_pass_shadow_catcher"),
+    PassName("ambient_occlusion", "Ambient Occlusion", "AO", "use_pass_ambient_occlusion"),
     PassName("mist", "Mist", "Mist", "use_pass_mist"),
     PassName("position", "Position", "Position", "use_pass_position"),
     PassName("uv", "UV", "UV", "use_pass_uv"),

@@ -81,7 +81,13 @@ class Coverage(AtPoints):
     name = "coverage"
 
 
-AT_POINTS = (SurfaceValues, Coverage)
+class Openness(AtPoints):
+    """How open what is seen is to what lies around it."""
+
+    name = "openness"
+
+
+AT_POINTS = (SurfaceValues, Coverage, Openness)
 
 
 class OwnPoint:

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ..materials import working_space
+from ..materials.nodes.inputs import STRAND
 from . import camera as cameras
 from . import motion as motions
 from .cache import MeshEntry, Placed, SnapshotCache
@@ -202,6 +203,7 @@ def _meshes(
         notes += entry.notes
         meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
 
+    notes += _fibres_without_strands(shading, shown_with, by_pointer)
     resolved: dict[int, tuple[str, tuple[int, ...], Links]] = {}
     for source in sources:
         mesh = by_pointer[source.pointer]
@@ -214,6 +216,25 @@ def _meshes(
     instances = _instances(places, transforms, resolved, attributes, list(meshes), cache)
     stats = {"meshes_read": read, "meshes_reused": len(meshes) - read, "instances": len(instances)}
     return meshes, instances, notes, stats
+
+
+def _fibres_without_strands(
+    shading: ShadingTable, shown_with: dict[int, set[int]], meshes: dict[int, Mesh]
+) -> list[Note]:
+    """What is to be said of materials of fibres on what is no strand."""
+    bare = [used for pointer, used in shown_with.items() if STRAND not in meshes[pointer].colors]
+    text = (
+        "Principled Hair is drawn as fibres on strands alone; a mesh with it is a diffuse surface that lets half of "
+        "its light through, far brighter than Cycles'. Use hair curves, or Principled BSDF on meshes."
+    )
+    notes = []
+    for index in sorted(set().union(*bare)):
+        if STRAND not in shading.wanted[index].attributes:
+            continue
+        material = shading.materials[index]
+        fibres = [node.label for node in material.graph.nodes.values() if node.type == "ShaderNodeBsdfHairPrincipled"]
+        notes += [Note(f"Material '{material.name}'", text, material.name, label) for label in fibres]
+    return notes
 
 
 def _instances(
@@ -396,6 +417,7 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         cryptomattes=tuple(kind for kind in CRYPTOMATTES if getattr(layer, f"use_pass_cryptomatte_{kind}")),
         cryptomatte_levels=layer.pass_cryptomatte_depth,
         light_groups=tuple(group.name for group in layer.lightgroups),
+        open_within=_open_within(scene.world) if layer.use_pass_ambient_occlusion else None,
     )
 
 
@@ -406,6 +428,11 @@ def aovs_of(layer) -> tuple[Aov, ...]:
     denoising = getattr(cycles, "denoising_store_passes", False)
     wanted = (("UV", layer.use_pass_uv), ("VECTOR", vector), ("HIT", vector), ("DISTANCE", denoising))
     return (*(Aov("", kind) for kind, asked in wanted if asked), *named)
+
+
+def _open_within(world) -> float:
+    """The Distance of the world's Ambient Occlusion; without a world, as a new one has it."""
+    return world.light_settings.distance if world is not None else 10.0
 
 
 def _clear_glass(cycles) -> float:

@@ -338,6 +338,7 @@ class Film:
     cryptomattes: tuple[str, ...] = ()  # of CRYPTOMATTES
     cryptomatte_levels: int = 6  # names that a pixel of a Cryptomatte holds
     light_groups: tuple[str, ...] = ()  # names; see light_groups.py
+    open_within: float | None = None  # metres: how far the pass Ambient Occlusion looks; None: it is not asked for
 
     @property
     def cryptomatte_images(self) -> int:

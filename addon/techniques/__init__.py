@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
 from .airlight import Airlight
+from .ambient_occlusion import AmbientOcclusion
 from .caustics_mapping import CausticsMapping
 from .clustered_visibility import ClusteredVisibility
 from .cryptomatte import Cryptomatte
@@ -79,6 +80,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ImageSpaceSubsurface,
     ShaderAovs,
     Cryptomatte,
+    AmbientOcclusion,
     History,
     Film,
     Denoise,

@@ -32,7 +32,7 @@ _LEFT = {
     "RENDER_PT_simplify_render",
     "RENDER_PT_simplify_viewport",
 }
-_LEFT_FAMILIES = ("lightprobe", "freestyle")
+_LEFT_FAMILIES = ("lightprobe",)
 
 
 def _shown() -> Iterator[type]:

@@ -12,6 +12,7 @@ from ..snapshot.scene import Film
 
 ORDERS = (DIRECT, INDIRECT)
 GLARE = "film.lens"
+NOISY = "film.noisy"
 _SHARE = "light group "  # names of images of a group's share of the picture begin so
 
 
@@ -52,7 +53,7 @@ class Sum:
         for name, pixels in images.items():
             if name not in self.images:
                 self.images[name] = pixels.copy() if self._film.light_groups else pixels
-            elif name.startswith(("radiance.", COMBINED, GLARE)):
+            elif name.startswith(("radiance.", COMBINED, GLARE, NOISY)):
                 self.images[name][..., :3] += pixels[..., :3]
                 if part.world:  # glass lets through what of the world is there
                     self.images[name][..., 3:] = pixels[..., 3:]

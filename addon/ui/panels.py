@@ -107,6 +107,16 @@ class CANDELA_RENDER_PT_simplify(_CandelaPanel, bpy.types.Panel):
                 part.prop(render, name, text=text)
 
 
+class CANDELA_RENDER_PT_performance(_CandelaPanel, bpy.types.Panel):
+    """What Blender itself keeps between frames: Candela keeps its own data in any case"""
+
+    bl_label = "Performance"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        _columns(self, animatable=False).prop(context.scene.render, "use_persistent_data", text="Persistent Data")
+
+
 class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):
     """Which passes make a picture, and settings for a given time"""
 
@@ -584,6 +594,7 @@ _CLASSES = (
     CANDELA_RENDER_PT_motion_blur_curve,
     CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_simplify,
+    CANDELA_RENDER_PT_performance,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_skipped,
     CANDELA_VIEWLAYER_PT_passes,

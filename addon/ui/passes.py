@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..film.aovs import places
+from ..frame.ledger import Ledger
 from ..frame.light_paths import LIGHT_PATHS
 from ..frame.technique import CAMERA
 from ..kernels import ranks
@@ -94,8 +95,17 @@ PASSES = tuple(
 CAMERA_AXES = "camera axes"  # (3, 3) beside the images that passes are made from: right, up, forward
 # What things change of the light on shadow catchers: 1 where nothing (film/catcher.py).
 CATCHER = RenderPass("cycles.use_pass_shadow_catcher", "Shadow Catcher", "RGB", "COLOR", "film.catcher")
-PASSES = (*PASSES, CATCHER)
+OPEN = RenderPass(
+    "use_pass_ambient_occlusion",
+    "Ambient Occlusion" if bpy.app.version >= (5, 0) else "AO",
+    "RGB",
+    "COLOR",
+    "film.open",
+)
+PASSES = (*PASSES, OPEN, CATCHER)
 
+# The picture as it was before Denoise, with the other data that a denoiser is told.
+NOISY = RenderPass("", "Noisy Image", "RGBA", "COLOR", "film.noisy")
 # The picture as an eye sees it, beside a Combined that stays as it is; written where glare is on.
 GLARE = RenderPass("", "Glare", "RGBA", "COLOR", "film.lens")
 
@@ -118,6 +128,7 @@ def _aov_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     if not distance:
         return named
     return [
+        NOISY,
         DenoisingAlbedo("", "Denoising Albedo", "RGB", "COLOR", "color.diffuse color.glossy color.transmission"),
         DenoisingNormal("", "Denoising Normal", "XYZ", "VECTOR", "surface.normal_sum"),
         RenderPass("", "Denoising Depth", "Z", "VALUE", *distance[0]),
@@ -200,6 +211,24 @@ def cryptomatte_metadata(snapshots: Sequence[Snapshot], layer: str) -> dict[str,
     return fields
 
 
+def render_metadata(layer: str, ledger: Ledger, seconds: float) -> dict[str, str]:
+    """Fields of a file's header that tell of the render of a view layer, named and written as Cycles' are; `seconds`
+    without the time of reading the scene."""
+    sync = ledger.times.get("sync", 0.0)
+    times = {"total_time": seconds + sync, "render_time": seconds, "synchronization_time": sync}
+    return {
+        f"candela.{layer}.samples": str(ledger.samples),
+        **{f"candela.{layer}.{name}": _clock(time) for name, time in times.items()},
+    }
+
+
+def _clock(seconds: float) -> str:
+    """As Blender writes times: MM:SS.hh, with hours before it where there are any."""
+    minutes, rest = divmod(seconds, 60.0)
+    hours, minutes = divmod(int(minutes), 60)
+    return (f"{hours:02}:" if hours else "") + f"{minutes:02}:{rest:05.2f}"
+
+
 def glare_is_on(scene: bpy.types.Scene) -> bool:
     """Whether pictures of the scene's camera are shown with glare."""
     camera = block_of(CAMERA, scene)
@@ -208,7 +237,7 @@ def glare_is_on(scene: bpy.types.Scene) -> bool:
 
 # Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.
 _OTHERS = (
-    ("use_pass_shadow", "Shadow"), ("use_pass_ambient_occlusion", "Ambient Occlusion"),
+    ("use_pass_shadow", "Shadow"),
     ("use_pass_subsurface_direct", "Subsurface Direct"), ("use_pass_subsurface_indirect", "Subsurface Indirect"),
     ("use_pass_subsurface_color", "Subsurface Color"),
 )  # fmt: skip

@@ -102,3 +102,24 @@ def test_strands_know_where_they_grow(stage):
     assert mesh.active_uv == "surface_uv_coordinate"
     np.testing.assert_allclose(mesh.uv_maps["surface_uv_coordinate"], places[strand])
     np.testing.assert_allclose(mesh.uv_maps["other"], 2.0 * places[strand])
+
+
+def test_fibres_on_a_mesh_are_told(stage):
+    """On strands they are fibres, and nothing is said."""
+    material = stage.material()
+    tree = material.node_tree
+    node = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
+    node.model = "CHIANG"
+    output = next(one for one in tree.nodes if one.type == "OUTPUT_MATERIAL")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    hair = bpy.data.hair_curves.new("Hair")
+    hair.add_curves([2])
+    hair.attributes["position"].data.foreach_set("vector", [0, -3, 0, 0, 3, 0])
+    hair.materials.append(material)
+    stage.link("Hair", hair)
+    assert not stage.take().notes
+    data = stage.mesh()
+    data.materials.append(material)
+    stage.link("Mesh", data)
+    (note,) = stage.take().notes
+    assert note.material == material.name and "strands alone" in note.text

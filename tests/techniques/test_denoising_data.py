@@ -59,6 +59,16 @@ def test_depth_begins_where_the_camera_begins_to_see(asked, kind):
     assert np.median(difference) < 2e-3 and (difference < 0.03).mean() > 0.9
 
 
+def test_the_noisy_image_is_the_picture_without_denoise(asked):
+    stage = steps(asked)
+    stage.light("AREA", (0, 0, 2), size=2.0, energy=100.0)
+    filtered = stage.written("CANDELA", 4, size=(24, 20), bounces=1)
+    stage.scene.candela.denoise_strength = 0.0
+    plain = stage.written("CANDELA", 4, size=(24, 20), bounces=1)["Combined"]
+    assert np.abs(filtered["Combined"] - plain).max() > 1e-3
+    np.testing.assert_allclose(filtered["Noisy Image"], plain, atol=1e-5)
+
+
 @pytest.mark.slow
 def test_nothing_runs_where_it_is_not_asked_for(asked):
     stage = steps(asked)
@@ -67,7 +77,7 @@ def test_nothing_runs_where_it_is_not_asked_for(asked):
     stage.layer.cycles.denoising_store_passes = False
     without = stage.written("CANDELA", 2)
     assert {name for name in with_it.keys() ^ without.keys() if name != "header"} == {
-        "Denoising Albedo", "Denoising Normal", "Denoising Depth",
+        "Denoising Albedo", "Denoising Normal", "Denoising Depth", "Noisy Image",
     }  # fmt: skip
     np.testing.assert_array_equal(with_it["Combined"], without["Combined"])
     assert stage.ledger.row("shader_aovs").state == "skipped"

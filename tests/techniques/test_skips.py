@@ -119,12 +119,13 @@ def grassy(stage):
 
 def passes_wanted(stage):
     layer = stage.scene.view_layers[0]
-    layer.use_pass_uv = layer.use_pass_cryptomatte_object = True
+    layer.use_pass_uv = layer.use_pass_cryptomatte_object = layer.use_pass_ambient_occlusion = True
 
 
 WITH = {
     "shader_aovs": passes_wanted,
     "cryptomatte": passes_wanted,
+    "ambient_occlusion": passes_wanted,
     "grass": grassy,
     "media": foggy,
     "airlight": foggy,
@@ -146,6 +147,7 @@ def samples_for(technique):
 WITHOUT = {
     "shader_aovs": no_needs,
     "cryptomatte": no_needs,
+    "ambient_occlusion": no_needs,
     "media": no_needs,
     "airlight": no_needs,
     "volume_caustics": no_needs,
@@ -202,7 +204,7 @@ def room(stage):
     stage.bounces = 2
     yield stage
     layer = stage.scene.view_layers[0]
-    layer.use_pass_uv = layer.use_pass_cryptomatte_object = False
+    layer.use_pass_uv = layer.use_pass_cryptomatte_object = layer.use_pass_ambient_occlusion = False
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from addon.techniques import REGISTRY
 from addon.techniques.denoise import Denoise
 from addon.ui import ENGINE, blender_panels, notes, panels, scoped_panels, technique_groups
 from addon.ui.pass_tree import TREE
-from addon.ui.passes import PASSES, wanted_passes
+from addon.ui.passes import PASSES, render_metadata, wanted_passes
 from addon.ui.properties import _SMALL as SMALL
 from addon.ui.properties import GROUPS, precision_of, settings_of, slots, titled
 
@@ -210,7 +210,7 @@ READ = {
     "render": (
         *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),
         *("use_simplify", "use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
-        "motion_blur_shutter_curve",
+        *("motion_blur_shutter_curve", "use_persistent_data"),
     ),
     "output": ("resolution_x", "use_border", "pixel_aspect_x"),
     "view_layer": (
@@ -323,7 +323,8 @@ def test_blenders_panels_are_shown_and_left_as_they_were(registered):
         "RENDER_PT_color_management", "RENDER_PT_format", "DATA_PT_lens", "EEVEE_MATERIAL_PT_surface",
         "EEVEE_WORLD_PT_surface", "DATA_PT_EEVEE_light", "MATERIAL_PT_preview",
     } <= with_candela  # fmt: skip
-    assert not {name for name in with_candela if "freestyle" in name or "lightprobe" in name or name == "DATA_PT_light"}
+    assert not {name for name in with_candela if "lightprobe" in name or name == "DATA_PT_light"}
+    assert {name for name in shown if "freestyle" in name and shown[name]} <= with_candela  # Blender itself draws lines
     blender_panels.withdraw(ENGINE)
     try:
         assert compatible() == {name: engines - {ENGINE} for name, engines in shown.items()}
@@ -450,3 +451,11 @@ def test_what_is_off_leaves_its_other_fields_grey_and_displacement_has_its_metho
     camera.candela.glare_mode = "CONVOLUTION"
     assert not (is_off(material, "grass") or is_off(camera, "eye") or is_off(material, "relief"))
     assert "displacement_method" in drawn(bpy.types.CANDELA_MATERIAL_PT_relief, material=material)
+
+
+def test_metadata_are_named_and_written_as_cycles_writes_its_own():
+    told = render_metadata("Layer", ledger.Ledger(times={"sync": 61.5}, samples=7), 3600 + 2.25)
+    assert told == {
+        "candela.Layer.samples": "7", "candela.Layer.render_time": "01:00:02.25",
+        "candela.Layer.synchronization_time": "01:01.50", "candela.Layer.total_time": "01:01:03.75",
+    }  # fmt: skip
