@@ -44,7 +44,7 @@ class AmbientOcclusion(Technique):
     provides = (Openness,)
 
     def skip(self, snapshot, settings):
-        if not settings.whole:
+        if not settings.schedule.has_passes:
             return "a viewport shows no passes"
         return None if snapshot.film.open_within is not None else "the view layer asks for no Ambient Occlusion"
 
