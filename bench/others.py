@@ -6,18 +6,19 @@ scripts off, and rendered by Candela with all light and by Cycles twice, in a pr
 a crash or a hang is one row of the table. A scene without a camera gets one that sees all of it; one without any light
 stays dark, and is compared dark.
 
-A row says relMSE of the picture without the reference's noise and without the worst hundredth of the pixels (edges in
-few samples), the mean beside Cycles', and the light paths whose mean differs by more than SHARE of the picture's light;
-then how many sentences Candela itself says about what it leaves out. `--page` writes docs/other_files.md, worst first.
+A row says relMSE of the picture with half and with all samples, without the reference's noise and without the worst
+hundredth of the pixels (edges in few samples), the mean beside Cycles', and the light paths whose mean differs by more
+than SHARE of the picture's light; then how many sentences Candela itself says about what it leaves out. `--page` writes
+docs/other_files.md, worst first.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
-import time
 import tomllib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -46,7 +47,9 @@ class Row:
     mean: float = 1.0
     off: list[str] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
-    seconds: float = 0.0
+    few: float = 0.0  # relMSE of half the samples
+    seconds: float = 0.0  # processor seconds of a picture, without compiling
+    cycles: float = 0.0  # the same of the reference
 
 
 def repositories() -> list[dict]:
@@ -103,13 +106,22 @@ def render(path: Path, options: argparse.Namespace) -> dict:
         images = render_passes(scene, engine, samples, seed, size=size).images
         return {"combined": images["combined"], **light_paths(images)}
 
-    started = time.monotonic()
+    def worked() -> float:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        return used.ru_utime + used.ru_stime
+
+    few = pictures("CANDELA", max(options.samples // 2, 1), 3)  # compiles, too
+    started = worked()
     own = pictures("CANDELA", options.samples, 3)
-    seconds = time.monotonic() - started
+    seconds = worked() - started
     said = [str(note) for note in ledger.latest().notes]
     if not all(np.isfinite(picture).all() for picture in own.values()):
         return {"state": "not finite", "said": said, "seconds": seconds}
+    started = worked()
     first, second = (pictures("CYCLES", options.reference_samples, seed) for seed in (1, 2))
+    cycles = (worked() - started) / 2
+    found, _ = differences(few, first, second, options.tolerance)
+    before = {name: float(error) for name, error, _ in map(str.split, found)}.get("combined", 0.0)
     found, _ = differences(own, first, second, options.tolerance)
     values = {name: (float(error), float(mean)) for name, error, mean in map(str.split, found)}
     error, mean = values.get("combined", (0.0, 1.0))
@@ -120,7 +132,7 @@ def render(path: Path, options: argparse.Namespace) -> dict:
         if abs(share := float((own[name] - (first[name] + second[name]) / 2)[..., :3].mean()) / light) > SHARE
     ]
     return {"state": "off" if error > options.tolerance else "alike", "error": error, "mean": mean,
-            "off": worse, "said": said, "seconds": seconds}  # fmt: skip
+            "off": worse, "said": said, "seconds": seconds, "few": before, "cycles": cycles}  # fmt: skip
 
 
 def add_camera(scene) -> bool:
@@ -179,7 +191,8 @@ def row_of(repository: dict, place: Path, path: Path, options: argparse.Namespac
 def line_of(row: Row) -> str:
     if row.state not in ("alike", "off"):
         return f"{row.state}: {row.path}"
-    return f"{row.state} {row.error:.4f} {row.mean:.3f}: {row.path} {'; '.join(row.off)}"
+    found = f"{row.few:.4f} {row.error:.4f} {row.mean:.3f} {row.seconds:.2f}/{row.cycles:.2f} s"
+    return f"{row.state} {found}: {row.path} {'; '.join(row.off)}"
 
 
 def page(rows: list[Row], options: argparse.Namespace) -> str:
@@ -193,19 +206,23 @@ def page(rows: list[Row], options: argparse.Namespace) -> str:
         if count:
             url = f"https://github.com/{one['name']}/tree/{one['commit']}"
             sources.append((f"[{one['name']}]({url})", one["commit"][:10], one["licence"], one["about"], str(count)))
-    table = [("file", "relMSE", "mean", "light paths that differ, of the picture's light", "sentences")]
+    off = "light paths that differ, of the picture's light"
+    table = [("file", f"relMSE {options.samples // 2}", str(options.samples), "time", "mean", off, "sentences")]
     rest = [("file", "why there is no comparison")]
     for row in sorted(rows, key=lambda row: -row.error):
         name = f"{row.repository.split('/')[1]}: {row.path}"
         if row in drawn:
-            table.append((name, f"{row.error:.4f}", f"{row.mean:.3f}", "; ".join(row.off), str(len(row.said))))
+            times = f"{row.seconds / max(row.cycles, 1e-3):.2f}"
+            errors = f"{row.few:.4f}", f"{row.error:.4f}"
+            table.append((name, *errors, times, f"{row.mean:.3f}", "; ".join(row.off), str(len(row.said))))
         else:
             rest.append((name, row.state))
     said = (
         f"{len(rows)} files, {options.samples} samples of Candela with all light beside two renders of "
         f"{options.reference_samples} samples of Cycles, {options.size[0]}x{options.size[1]} at most. "
         f"{len(drawn)} could be compared; {alike} have a relMSE of at most {options.tolerance:g}; "
-        f"{ended} ended Blender."
+        f"{ended} ended Blender. relMSE of half the samples and of all; time: processor seconds of all beside those of "
+        f"a render of Cycles, without compiling."
     )
     parts = [said, markdown.table(sources), markdown.table(table)]
     return "\n\n".join(parts + ([markdown.table(rest)] if len(rest) > 1 else []))
