@@ -28,7 +28,7 @@ from ..scene.world_tree import WorldTree
 from ..snapshot.scene import NO_LINKS, RANKED, Note, Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
-from . import device_probe, history
+from . import device_probe, history, too_large
 from . import ledger as ledger_module
 from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .picture import Frame
@@ -111,9 +111,8 @@ class Renderer:
         self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
         plan = make_plan(self.techniques, snapshot, settings)
         ledger.times["upload"], ledger.times["compile"] = watch.working, watch.compiling
-        ledger.notes = tuple(
-            dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes))
-        )
+        said = (*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes)
+        ledger.notes = tuple(dict.fromkeys((*said, *too_large.notes_of(plan, snapshot))))
 
         light = self._light_key(snapshot, settings, plan)
         key = self._content_key(snapshot, settings, light)
