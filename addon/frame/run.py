@@ -28,7 +28,7 @@ from ..scene.world_tree import WorldTree
 from ..snapshot.scene import NO_LINKS, RANKED, Note, Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
-from . import device_probe, history, too_large
+from . import device_probe, history, left_out
 from . import ledger as ledger_module
 from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .picture import Frame
@@ -112,7 +112,7 @@ class Renderer:
         plan = make_plan(self.techniques, snapshot, settings)
         ledger.times["upload"], ledger.times["compile"] = watch.working, watch.compiling
         said = (*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes)
-        ledger.notes = tuple(dict.fromkeys((*said, *too_large.notes_of(plan, snapshot))))
+        ledger.notes = tuple(dict.fromkeys((*said, *left_out.notes_of(plan, snapshot, settings))))
 
         light = self._light_key(snapshot, settings, plan)
         key = self._content_key(snapshot, settings, light)

@@ -1,16 +1,17 @@
-"""Scenes with more triangles than rays or points can have say what their pictures lack."""
+"""What pictures lack by design is said: for the scene's size, and where systems meet."""
 
 from types import SimpleNamespace
 
 import pytest
 
-from addon.frame import too_large
+from addon.frame import left_out
 from addon.frame.ledger import SKIPPED, Row
 from addon.frame.plan import Plan
 from addon.scene import acceleration
 from addon.ui.notes import losses
 
 SCENE = SimpleNamespace()
+FEW = SimpleNamespace(bounces=0)
 
 
 def row(name, reason, slot=""):
@@ -30,14 +31,14 @@ def test_what_is_left_out_for_the_scene_s_size_is_said(large):
         row("shaded_reflections", large), row("traced_refraction", "no material is glass", "transmission"),
         row("light_probes", large),
     )  # fmt: skip
-    (note,) = losses(too_large.notes_of(Plan((), skipped, {}), SCENE))
+    (note,) = losses(left_out.notes_of(Plan((), skipped, {}), SCENE, FEW))
     assert str(note).startswith(f"Scene: {large}: bounced light, light in volumes and what mirrors and glass show")
     assert "are missing from the picture" in note.text and "copies" in note.text
 
 
 def test_a_slot_that_another_technique_fills_is_not_missing(large):
     plan = Plan((), (row("instant_radiosity", large, "indirect"),), {"indirect": "ssdo"})
-    (note,) = losses(too_large.notes_of(plan, SCENE))
+    (note,) = losses(left_out.notes_of(plan, SCENE, FEW))
     assert "missing where it comes from what the camera does not see" in note.text
 
 
@@ -45,7 +46,18 @@ def test_scenes_that_can_be_traced_say_nothing(monkeypatch):
     monkeypatch.setattr(acceleration, "too_many", lambda snapshot: None)
     monkeypatch.setattr(acceleration, "too_many_copies", lambda snapshot: "many")
     skipped = row("implicit_visibility", "many", "indirect"), row("image_space_subsurface", "many", "subsurface")
-    notes = too_large.notes_of(Plan((), skipped[:1], {"indirect": "instant_radiosity"}), SCENE)
+    notes = left_out.notes_of(Plan((), skipped[:1], {"indirect": "instant_radiosity"}), SCENE, FEW)
     assert notes == ()
-    (note,) = too_large.notes_of(Plan((), skipped, {"indirect": "instant_radiosity"}), SCENE)
+    (note,) = left_out.notes_of(Plan((), skipped, {"indirect": "instant_radiosity"}), SCENE, FEW)
     assert note.text.startswith("many: light below surfaces is missing")
+
+
+@pytest.mark.parametrize(("bounces", "count"), [(0, 0), (2, 1)])
+def test_what_mirrors_lack_of_volumes_and_grass_is_said(monkeypatch, bounces, count):
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    settings = SimpleNamespace(bounces=4, get=lambda technique, name: bounces)
+    air, mirrors, grass = (SimpleNamespace(name=name) for name in ("airlight", "shaded_reflections", "grass"))
+    assert len(left_out.notes_of(Plan((air, mirrors), (), {}), SCENE, settings)) == count
+    assert len(left_out.notes_of(Plan((air, mirrors, grass), (), {}), SCENE, settings)) == count + 1
+    assert left_out.notes_of(Plan((air, grass), (), {}), SCENE, settings) == ()

@@ -1,0 +1,56 @@
+"""What a picture lacks by design, in words for its ledger: for the scene's size, or where systems meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..scene import acceleration
+from ..snapshot.scene import Note, Snapshot
+from .plan import Plan
+from .settings import Settings
+
+# By slot, or by name of a technique without one: what is missing where nobody brings it.
+BRINGS = {
+    "indirect": "bounced light",
+    "reflection": "what gloss shows of lights and of the world",
+    "shaded_reflections": "what mirrors and glass show of the scene",
+    "transmission": "how glass bends light",
+    "volume": "light in volumes",
+    "caustics": "caustics",
+    "volume_caustics": "caustics in volumes",
+    "subsurface": "light below surfaces",
+}
+
+
+def notes_of(plan: Plan, snapshot: Snapshot, settings: Settings) -> tuple[Note, ...]:
+    """None for most scenes."""
+    return (*_for_size(plan, snapshot), *_where_systems_meet(plan, settings))
+
+
+def _for_size(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:
+    """What the scene has too many triangles for."""
+    traces = acceleration.too_many(snapshot) is None
+    for reason in (acceleration.too_many(snapshot), acceleration.too_many_copies(snapshot)):
+        rows = [row for row in plan.skipped if reason is not None and row.reason == reason]
+        open_slots = [row.slot or row.name for row in rows if row.slot not in plan.filled]
+        missing = list(dict.fromkeys(BRINGS[name] for name in open_slots if name in BRINGS))
+        if missing:
+            text = f"{reason}: {_together(missing)} {'are' if len(missing) > 1 else 'is'} missing from the picture. "
+            yield Note("Scene", text + "Give meshes fewer faces, or use copies of one mesh in place of many.")
+        if not traces and any(row.name == "instant_radiosity" for row in rows) and "indirect" in plan.filled:
+            yield Note("Scene", f"{reason}: bounced light is missing where it comes from what the camera does not see.")
+
+
+def _where_systems_meet(plan: Plan, settings: Settings) -> Iterator[Note]:
+    if not plan.runs("shaded_reflections"):
+        return
+    air = next((technique for technique in plan.techniques if technique.name == "airlight"), None)
+    if air is not None and min(settings.bounces, settings.get(air, "bounces")) > 0:
+        text = "mirrors and glass show light that volumes scatter once; what they scatter more often is missing there."
+        yield Note("Volumes", text)
+    if plan.runs("grass"):
+        yield Note("Grass", "mirrors, glass and bounced light meet the ground; the blades are missing there.")
+
+
+def _together(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
