@@ -21,6 +21,8 @@ BRINGS = {
     "subsurface": "light below surfaces",
 }
 
+NO_GRASS = ("no material", "it is not in the pass tree")  # how reasons begin that nobody need hear
+
 
 def notes_of(plan: Plan, snapshot: Snapshot, settings: Settings) -> tuple[Note, ...]:
     """None for most scenes."""
@@ -42,6 +44,9 @@ def _for_size(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:
 
 
 def _where_systems_meet(plan: Plan, settings: Settings) -> Iterator[Note]:
+    row = next((row for row in plan.skipped if row.name == "grass" and not row.reason.startswith(NO_GRASS)), None)
+    if row is not None:
+        yield Note("Grass", f"it is missing: {row.reason}.")
     if not plan.runs("shaded_reflections"):
         return
     air = next((technique for technique in plan.techniques if technique.name == "airlight"), None)

@@ -47,7 +47,7 @@ from ..lighting.grass import TABLE, GrassTable
 from ..lighting.visibility import Layer, Layers
 from ..materials.estimate import srgb_decode
 from ..scene import uv_placed
-from ..snapshot.scene import Material, Snapshot
+from ..snapshot.scene import Material, Note, Snapshot
 from ..surfaces.draw import StandIns
 
 NONE, MEADOW, FILE = "NONE", "MEADOW", "FILE"
@@ -184,7 +184,9 @@ class Grass(Technique):
         for material in _wanted(frame.snapshot):
             try:
                 fields.append(_field(frame.snapshot, frame.snapshot.materials[material]))
-            except PatchError:
+            except PatchError as error:
+                told = Note(f"Material '{frame.snapshot.materials[material].name}'", f"its grass is missing: {error}")
+                frame.ledger.notes = (*frame.ledger.notes, told)
                 continue
             entries[material] = len(fields) - 1
         key = (

@@ -61,3 +61,10 @@ def test_what_mirrors_lack_of_volumes_and_grass_is_said(monkeypatch, bounces, co
     assert len(left_out.notes_of(Plan((air, mirrors), (), {}), SCENE, settings)) == count
     assert len(left_out.notes_of(Plan((air, mirrors, grass), (), {}), SCENE, settings)) == count + 1
     assert left_out.notes_of(Plan((air, grass), (), {}), SCENE, settings) == ()
+
+
+def test_grass_whose_patch_cannot_be_read_is_said(monkeypatch):
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    for reason, count in (("no material that is shown is covered with grass", 0), ("'a.grass' does not exist", 1)):
+        assert len(left_out.notes_of(Plan((), (row("grass", reason),), {}), SCENE, FEW)) == count
