@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..scene import acceleration
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Note, Snapshot
 from .plan import Plan
 from .settings import Settings
@@ -16,9 +17,11 @@ BRINGS = {
     "shaded_reflections": "what mirrors and glass show of the scene",
     "transmission": "how glass bends light",
     "volume": "light in volumes",
-    "caustics": "caustics",
-    "volume_caustics": "caustics in volumes",
+    "caustics": "light of caustics",
+    "volume_caustics": "light of caustics in volumes",
     "subsurface": "light below surfaces",
+    "reflection_editing": "what edits of reflections change",
+    "temporal_glare": "the glare of the eye",
 }
 
 NO_GRASS = ("no material", "it is not in the pass tree")  # how reasons begin that nobody need hear
@@ -30,17 +33,25 @@ def notes_of(plan: Plan, snapshot: Snapshot, settings: Settings) -> tuple[Note, 
 
 
 def _for_size(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:
-    """What the scene has too many triangles for."""
+    """What the scene has too many triangles for, and what a panorama lacks."""
+    bent = bends_lines(snapshot)
+    if missing := _missing(plan, bent):
+        yield Note("Camera", f"{bent}: {missing} missing from the picture.")
     traces = acceleration.too_many(snapshot) is None
     for reason in (acceleration.too_many(snapshot), acceleration.too_many_copies(snapshot)):
-        rows = [row for row in plan.skipped if reason is not None and row.reason == reason]
-        open_slots = [row.slot or row.name for row in rows if row.slot not in plan.filled]
-        missing = list(dict.fromkeys(BRINGS[name] for name in open_slots if name in BRINGS))
-        if missing:
-            text = f"{reason}: {_together(missing)} {'are' if len(missing) > 1 else 'is'} missing from the picture. "
+        if missing := _missing(plan, reason):
+            text = f"{reason}: {missing} missing from the picture. "
             yield Note("Scene", text + "Give meshes fewer faces, or use copies of one mesh in place of many.")
-        if not traces and any(row.name == "instant_radiosity" for row in rows) and "indirect" in plan.filled:
+        names = {row.name for row in plan.skipped if row.reason == reason}
+        if not traces and "instant_radiosity" in names and "indirect" in plan.filled:
             yield Note("Scene", f"{reason}: bounced light is missing where it comes from what the camera does not see.")
+
+
+def _missing(plan: Plan, reason: str | None) -> str:
+    """What nobody brings since its techniques were skipped for this reason, with its verb; empty for nothing."""
+    rows = [row for row in plan.skipped if reason is not None and row.reason == reason and row.slot not in plan.filled]
+    names = list(dict.fromkeys(BRINGS[row.slot or row.name] for row in rows if (row.slot or row.name) in BRINGS))
+    return f"{_together(names)} {'are' if len(names) > 1 else 'is'}" if names else ""
 
 
 def _where_systems_meet(plan: Plan, settings: Settings) -> Iterator[Note]:

@@ -8,9 +8,10 @@ from addon.frame import left_out
 from addon.frame.ledger import SKIPPED, Row
 from addon.frame.plan import Plan
 from addon.scene import acceleration
+from addon.snapshot.panorama import bends_lines
 from addon.ui.notes import losses
 
-SCENE = SimpleNamespace()
+SCENE = SimpleNamespace(camera=None)
 FEW = SimpleNamespace(bounces=0)
 
 
@@ -68,3 +69,12 @@ def test_grass_whose_patch_cannot_be_read_is_said(monkeypatch):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
     for reason, count in (("no material that is shown is covered with grass", 0), ("'a.grass' does not exist", 1)):
         assert len(left_out.notes_of(Plan((), (row("grass", reason),), {}), SCENE, FEW)) == count
+
+
+def test_what_panoramas_lack_is_said(monkeypatch):
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    scene = SimpleNamespace(camera=SimpleNamespace(panorama="equirectangular"))
+    skipped = (row("volume_caustics", bends_lines(scene)), row("screen_space_photons", bends_lines(scene), "caustics"))
+    (note,) = losses(left_out.notes_of(Plan((), skipped, {"caustics": "caustics_mapping"}), scene, FEW))
+    assert note.text == f"{bends_lines(scene)}: light of caustics in volumes is missing from the picture."
