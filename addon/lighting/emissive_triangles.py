@@ -9,7 +9,7 @@ import numpy as np
 from ..frame.picture import Frame
 from ..kernels.morton import morton_codes
 from ..materials.compiled import CompiledMaterial
-from ..scene.emission_maps import TriangleEmission
+from ..scene.emission_maps import EmissiveLevel, TriangleEmission
 from ..scene.receivers import Receivers
 from ..sources import lights
 
@@ -29,6 +29,9 @@ class EmissiveTriangles:
 
     They stand along a space-filling curve, so that points drawn by well-spread numbers are spread in space: in the
     order of the meshes, rows of a ball or lamps of a room would get no point in a picture of few samples.
+
+    Half of the points are drawn by power and half by area, with the density (Le + level) / power per m2: a faint lamp
+    near by is else found by no point while a strong one is far away, and then counts many times in another sample.
     """
 
     def __init__(self, frame: Frame, paths: Sequence[str], without: str | None = None):
@@ -85,13 +88,18 @@ class EmissiveTriangles:
         self.unlit, self.passing = [self.unlit[k] for k in source], [self.passing[k] for k in source]
         weight = np.abs(self.radiance) @ lights.LUMINANCE * double_area / 2
         weight = np.where(np.isfinite(weight), weight, 0.0)
-        self.power = float(weight.sum())
+        shining = np.where(weight > 0.0, double_area / 2, 0.0)
+        level = frame.shared(EmissiveLevel)
+        if not level.value > 0.0 and weight.sum() > 0.0:  # one for all who share light between points and rays
+            level.value = float(weight.sum() / shining.sum())
+        self.level = level.value
+        self.power = float(weight.sum() + self.level * shining.sum())
         # As one light: where its power is, and half the diagonal of a square that is as large. Several lamps of one
         # size stand for as much area.
         self.centre = np.average(self.corners.mean(axis=1), axis=0, weights=weight) if self.power > 0 else np.zeros(3)
         density = (weight * weight / np.maximum(double_area / 2, 1e-30)).sum()
-        self.reach = float(np.sqrt(self.power**2 / max(float(density), 1e-300) / 2)) if self.power > 0 else 0.0
-        self._edges = np.concatenate([[0.0], np.cumsum(weight)])
+        self.reach = float(np.sqrt(weight.sum() ** 2 / max(float(density), 1e-300) / 2)) if self.power > 0 else 0.0
+        self._edges = np.concatenate([[0.0], np.cumsum(weight + self.level * shining)]) / max(self.power, 1e-300)
         self._receivers = frame.receivers
 
     @property
@@ -112,7 +120,7 @@ class EmissiveTriangles:
     def texels(self) -> np.ndarray:
         """(4 N, 4): what shaders/light/mesh_rays.glsl reads."""
         found = np.zeros((len(self.radiance), 4, 4))
-        found[:, 0, :3], found[:, 0, 3] = self.corners[:, 0], self._edges[:-1] / self.power
+        found[:, 0, :3], found[:, 0, 3] = self.corners[:, 0], self._edges[:-1]
         found[:, 1:3, :3] = self.corners[:, 1:] - self.corners[:, :1]
         across = np.cross(found[:, 1, :3], found[:, 2, :3])
         found[:, 1, 3] = self.sided
@@ -137,17 +145,20 @@ class EmissiveTriangles:
 
     def stretched(self, x: float, y: float) -> np.ndarray:
         """Three numbers for `draw` out of two: where `x` lies within a triangle's share of the power is the third."""
-        k = int(np.clip(np.searchsorted(self._edges, x * self.power, side="right") - 1, 0, len(self.radiance) - 1))
+        k = self._at(x)
         share = max(self._edges[k + 1] - self._edges[k], 1e-300)
-        return np.array([x, y, np.clip((x * self.power - self._edges[k]) / share, 0.0, 1.0)])
+        return np.array([x, y, np.clip((x - self._edges[k]) / share, 0.0, 1.0)])
 
     def draw(self, x: float, y: float, z: float) -> tuple[int, np.ndarray, float]:
         """From three uniform numbers: a triangle, a point on it, and the density per m2."""
-        k = int(np.clip(np.searchsorted(self._edges, x * self.power, side="right") - 1, 0, len(self.radiance) - 1))
+        k = self._at(x)
         root = np.sqrt(y)
         a, b, c = self.corners[k]
         point = (1 - root) * a + root * (1 - z) * b + root * z * c
-        return k, point, float(np.abs(self.radiance[k]) @ lights.LUMINANCE) / self.power
+        return k, point, (float(np.abs(self.radiance[k]) @ lights.LUMINANCE) + self.level) / self.power
+
+    def _at(self, x: float) -> int:
+        return int(np.clip(np.searchsorted(self._edges, x, side="right") - 1, 0, len(self.radiance) - 1))
 
 
 def compact(corners: np.ndarray, radiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

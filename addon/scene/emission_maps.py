@@ -40,6 +40,14 @@ ALIKE = 0.05  # share of the brightest cell by which those of a triangle that is
 SAME_SIDES = 0.1  # relative difference of the sides' emission that the directions alone may make
 
 
+class EmissiveLevel:
+    """Luminance that is added to that of each emissive triangle where points are drawn (frame.shared): the mean of all,
+    0 where nothing emits."""
+
+    def __init__(self):
+        self.value = 0.0
+
+
 @dataclass(frozen=True)
 class TriangleEmission:
     """Of the triangles of a mesh with given materials in its slots. Radiance is that of front and back."""

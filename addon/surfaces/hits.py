@@ -46,6 +46,7 @@ from ..gfx.library import Program
 from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..scene.acceleration import Hierarchy
+from ..scene.emission_maps import EmissiveLevel
 from ..scene.geometry import corner_attribute
 from ..scene.materials import (
     AVERAGING_DEFINES,
@@ -84,6 +85,7 @@ TRACE = passes.fullscreen_program(
         ("INT", "first_leaf"),
         ("FLOAT", "spread"),
         ("FLOAT", "offset_size"),
+        ("FLOAT", "emissive_level"),
     ),
     outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
     writes_depth=True,
@@ -306,6 +308,7 @@ class Hits:
                 "ray_number": number, "glass_bends": int(refracts(frame)),
                 "first_leaf": hierarchy.first_leaf - _leaves_of_rows(hierarchy),
                 "spread": pixel_spread(frame), "offset_size": frame.offset_size,
+                "emissive_level": frame.shared(EmissiveLevel).value,
             },
         )  # fmt: skip
         frame.count(technique, "passes")

@@ -1,9 +1,10 @@
 """Emissive light: meshes whose material emits, as light sources of other surfaces.
 
-Points on emissive triangles are drawn in proportion to area times luminance, a few per sample (in pictures of few
+Points on emissive triangles are drawn half by power and half by area, a few per sample (in pictures of few
 samples so many that the picture has FEWEST_POINTS), each with depth maps. All are of one low-discrepancy set:
 
-    L(x, v) = mean over samples of  f(x, v, w) cos(w) Le |cos_y| V(x, y) / (|x - y|^2 p(y)),   p(y) = lum(Le) / power
+    L(x, v) = mean over samples of  f(x, v, w) cos(w) Le |cos_y| V(x, y) / (|x - y|^2 p(y)),
+    p(y) = (lum(Le) + mean of lum) / (2 power)
 
 As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissive triangles by their own rays
 (traced_glossy), weighted against these points.
@@ -65,7 +66,12 @@ MESH_RAYS = Lookup(
     "mesh rays",
     "light/mesh_rays.glsl",
     textures=(*acceleration.HIERARCHY_TEXTURES, ("RGBA32F", "mesh_lights")),
-    constants=(*RAY_CONSTANTS, ("INT", "mesh_light_count"), ("FLOAT", "mesh_light_power")),
+    constants=(
+        *RAY_CONSTANTS,
+        ("INT", "mesh_light_count"),
+        ("FLOAT", "mesh_light_power"),
+        ("FLOAT", "mesh_light_level"),
+    ),
     defines=(("OWN_POINTS", "1"), ("CANDIDATE_POINTS", "8")),
     maps=False,
 )
@@ -176,7 +182,7 @@ class EmissiveLight(Technique):
             None, NO_VIEWS, MESH_RAYS, textures={**textures, "mesh_lights": self._near},
             constants={
                 **constants, "mesh_light_count": len(self._triangles.radiance),
-                "mesh_light_power": self._triangles.power,
+                "mesh_light_power": self._triangles.power, "mesh_light_level": self._triangles.level,
             },
         )  # fmt: skip
 

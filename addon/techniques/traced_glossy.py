@@ -41,6 +41,7 @@ from ..lighting.repeated_light import Lit
 from ..lighting.visibility import TracedLobes
 from ..materials.compiler import may_emit
 from ..scene import acceleration
+from ..scene.emission_maps import EmissiveLevel
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -60,6 +61,7 @@ TRACED = passes.fullscreen_program(
     constants=(
         ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"),
         ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
+        ("FLOAT", "emissive_level"),
         ("FLOAT", "shaded_roughness"),
         ("INT", "glass_bends"),
     ),
@@ -129,6 +131,7 @@ class TracedGlossy(Technique):
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
                 "emissive_power": emissive.power, "emissive_points": emissive.count,
+                "emissive_level": frame.shared(EmissiveLevel).value,
                 "shaded_roughness": shaded_roughness(frame),
                 "glass_bends": int(refracts(frame)),
             },

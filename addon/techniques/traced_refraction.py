@@ -45,6 +45,7 @@ from ..lighting.media import MediaService, dimmed
 from ..lighting.path_sources import SHOWN_THROUGH, PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
+from ..scene.emission_maps import EmissiveLevel
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
@@ -56,7 +57,7 @@ from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
 BEHIND = ("reflectance", "interface_table", "behind_position", "behind_albedo", "virtual_lights")
-EMISSIVE = ("emissive_power", "emissive_points")
+EMISSIVE = ("emissive_power", "emissive_points", "emissive_level")
 REFRACTION = passes.fullscreen_program(
     "traced refraction",
     "light/refraction.frag.glsl",
@@ -71,7 +72,7 @@ REFRACTION = passes.fullscreen_program(
     constants=(
         ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "interfaces"),
         ("INT", "world_transmission"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"),
-        ("FLOAT", "emissive_points"), ("FLOAT", "clear_roughness"), *NEAR_CONSTANTS,
+        ("FLOAT", "emissive_points"), ("FLOAT", "emissive_level"), ("FLOAT", "clear_roughness"), *NEAR_CONSTANTS,
     ),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
     leaves_out=(
@@ -181,7 +182,7 @@ class TracedRefraction(Technique):
         }  # fmt: skip
         bindings["constants"] |= {
             "interfaces": frame.settings.get(self, "interfaces"), "emissive_power": self._sources.emissive_power,
-            "emissive_points": float(EMISSIVE_POINTS), **near,
+            "emissive_points": float(EMISSIVE_POINTS), "emissive_level": frame.shared(EmissiveLevel).value, **near,
         }  # fmt: skip
         self._draw(frame, REFRACTION, bindings)
         for image in behind.colors:

@@ -4,8 +4,8 @@
 //   triangle   row of the instance, number of the triangle among those of its material, barycentric coordinates of the
 //              second and third corner
 //   normals    octahedral normal of the triangle by its winding (xy) and shading normal outwards (zw)
-//   passed     what the inside of a solid that the ray was in has let pass; w: luminance of the mean radiance that the
-//              triangle emits, times distance squared over cosine: a density per steradian times the power of all
+//   passed     what the inside of a solid that the ray was in has let pass; w: the density per steradian at which points are
+//              drawn on it if it emits, times the power of all (emissive_density)
 //   material   its number
 //
 // Depth: as it was, 0, where there is no ray, as is all else there; 0.5 where one meets nothing, above where one does, by program.
@@ -66,7 +66,7 @@ void main()
   out_normals = vec4(octahedral_encode(normal), octahedral_encode(shading));
   vec3 ignored;
   vec3 emission = triangle_emission(hit, direction, ignored);
-  out_passed.w = luminance(abs(emission)) * t * t / max(abs(dot(normal, direction)), 1e-6);
+  out_passed.w = emissive_density(emission, emissive_level) * t * t / max(abs(dot(normal, direction)), 1e-6);
   vec3 outwards = (dot(normal, shading) < 0.0) ? -normal : normal;
 #ifdef ABSORBING
   vec3 absorbed = vec3(0.0);

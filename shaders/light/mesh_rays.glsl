@@ -61,15 +61,17 @@ Light own_point(Light light, int number)
     vec3 direction = safe_normalize(way);
     float cos_light = -dot(direction, facing);
     cos_light = (edge.w > 0.5) ? max(cos_light, 0.0) : abs(cos_light);
-    // Drawn in proportion to luminance: by it a point counts the less.
+    // What is drawn more often counts the less: in proportion to luminance and, as often, to area.
     float share = cos_light / squared * (0.1 + 0.9 * max(dot(normal, direction), 0.0));
+    float shining = luminance(abs(radiance));
+    share *= shining / max(shining + mesh_light_level, 1e-30);
     total += share;
     float chance = share / max(total, 1e-30);
     bool taken = share > 0.0 && roll < chance;
     roll = clamp(taken ? roll / chance : (roll - chance) / max(1.0 - chance, 1e-6), 0.0, 1.0);
     if (taken) {
       chosen = share;
-      bright = luminance(abs(radiance));
+      bright = shining + mesh_light_level;
       light.point = light.centre = point;
       light.axis = facing;
       light.radiance = radiance;

@@ -183,7 +183,7 @@ void main()
 #ifndef FIRST_ALONE
     if (goes_on) {
       vec3 emission = triangle_emission(hit, direction, normal);
-      float light_density = luminance(abs(emission)) * t * t
+      float light_density = emissive_density(emission, emissive_level) * t * t
                             / max(emissive_power * abs(dot(normal, direction)), 1e-30);
       gained += throughput * emission
                 * ((lobe_density > 0.0) ? power_share(lobe_density, emissive_points * light_density) : 1.0);

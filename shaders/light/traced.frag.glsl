@@ -136,8 +136,9 @@ void main()
       if (!mirror && max_component(abs(emission)) > 0.0) {
         float lobe_density;
         lobe_reflection(lobe, direction, lobe_density);
-        // Points are drawn with density luminance / power per area (addon/techniques/emissive_light.py).
-        float light_density = luminance(abs(emission)) / emissive_power * t * t / max(abs(dot(normal, direction)), 1e-6);
+        // The density of points per area: addon/lighting/emissive_triangles.py.
+        float light_density = emissive_density(emission, emissive_level) / emissive_power * t * t
+                              / max(abs(dot(normal, direction)), 1e-6);
         float ratio = emissive_points * light_density / max(lobe_density, 1e-30);
         share = 1.0 / (1.0 + ratio * ratio);
       }

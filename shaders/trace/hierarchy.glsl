@@ -469,6 +469,13 @@ vec3 triangle_emission(ivec2 hit, vec3 direction, out vec3 normal)
   return dark ? vec3(0.0) : vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
 }
 
+// Points are drawn on emissive triangles with this density per area, over the power of all (addon/lighting/emissive_triangles.py).
+float emissive_density(vec3 emission, float level)
+{
+  float shining = luminance(abs(emission));
+  return (shining > 0.0) ? shining + level : 0.0;
+}
+
 vec3 corner_normal(ivec2 hit, int corner)
 {
   vec3 normal = unpack_normal(leaf_texel(hit.x * LEAF_TEXELS + NORMAL_TEXEL + corner)[HIT_SLOT(hit)]);

@@ -211,6 +211,19 @@ def test_a_glowing_ball_is_as_bright_with_each_seed(floor):
     assert shares.std() < 0.01 and shares.mean() == pytest.approx(1.0, abs=0.02)  # its flat faces hold 1 % less
 
 
+def test_a_faint_lamp_near_by_is_found_beside_a_strong_one_far_away(floor):
+    """It has a thousandth of the power and most of the light: points drawn by power alone miss it in most pictures."""
+    panel(floor, z=1.0, half=0.1).visible_shadow = False
+    floor.glow = floor.material("ShaderNodeEmission", Strength=1000 * RADIANCE, Color=(1, 1, 1, 1))
+    panel(floor, z=40.0, half=0.1)
+    square = (0.1, 0, 0), (0, 0.1, 0)
+    near, far = (model.area((0, 0, z), *square, scale * RADIANCE * 0.04 * np.pi) for z, scale in ((1, 1), (40, 1000)))
+    expected = model.irradiance(near, receivers(1)) + model.irradiance(far, receivers(1))
+    found = irradiance(floor, 8)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.02)
+    np.testing.assert_allclose(found[::4, ::4].ravel(), expected.reshape(found.shape)[::4, ::4].ravel(), rtol=0.1)
+
+
 def test_triangles_stand_along_a_curve_by_place_and_side():
     """Lamps that are far apart for what is lit stand together whole, and their sides together within them."""
     lamp, side = np.repeat(np.arange(8), 4), np.tile([0, 1, 0, 1], 8)
