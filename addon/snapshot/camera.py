@@ -12,7 +12,9 @@ import numpy as np
 
 from .errors import UnsupportedScene
 from .panorama import Panorama, panorama_of
-from .scene import Aperture, Camera
+from .scene import Aperture, Camera, Note
+
+OBLIQUE = 0.005  # cosine between two axes of a camera from which on its shear is told of
 
 
 def camera_of_scene(
@@ -189,6 +191,19 @@ def _focus_point(dof):
         if bone is not None:
             return (target.matrix_world @ bone.matrix).translation
     return target.matrix_world.translation
+
+
+def shear_note(camera) -> Note | None:
+    """What is to be said of a camera whose parents' uneven scale and turns have made its axes oblique."""
+    axes = np.array(camera.matrix_world, np.float64)[:3, :3]
+    axes = axes / np.maximum(np.linalg.norm(axes, axis=0), 1e-30)
+    if np.abs(axes.T @ axes - np.eye(3)).max() < OBLIQUE:
+        return None
+    text = (
+        "its parents' uneven scale shears it, and Blender its picture, which is drawn unsheared: clear the parents' "
+        "scale, or parent the camera to an object that is scaled evenly."
+    )
+    return Note(f"Camera '{camera.name}'", text)
 
 
 def _rigid(matrix: np.ndarray) -> np.ndarray:

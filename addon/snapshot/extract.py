@@ -89,6 +89,8 @@ def take(
     if view is None:
         camera = camera or scene.camera
         view = cameras.camera_of_scene(scene, depsgraph, width, height, camera)
+        sheared = cameras.shear_note(camera.evaluated_get(depsgraph))
+        notes += [] if sheared is None else [sheared]
         border = border or _scene_border(scene.render, width, height)
 
     images = ImageTable(cache, scene.frame_current)

@@ -181,7 +181,7 @@ def walk(
                 if kind == "MESH" and not hair and not (use_volumes if facts.smoke else solid):
                     known[identity] = LEFT_OUT
                     continue
-                materials = tuple([slot.material for slot in found.material_slots])
+                materials = _materials(found)
                 if hair and materials:
                     materials = (materials[min(max(data.slot, 0), len(materials) - 1)],)
                 own = f"/hair {data.number}" if hair else ""
@@ -292,6 +292,18 @@ def domain_of(owner):
         if settings is not None and settings.domain_type == "GAS":
             return settings
     return None
+
+
+def _materials(found) -> tuple:
+    """Materials of an evaluated object's slots, None where one is empty. An empty slot that is linked to the object is
+    empty, as Cycles has it: of the evaluated object Blender's Python says the mesh's material there."""
+    slots = found.material_slots
+    if all(slot.link == "DATA" for slot in slots):
+        return tuple([slot.material for slot in slots])
+    empty = {
+        k for k, slot in enumerate(found.original.material_slots) if slot.link == "OBJECT" and slot.material is None
+    }
+    return tuple([None if k in empty else slot.material for k, slot in enumerate(slots)])
 
 
 def _is_linked(owner) -> bool:

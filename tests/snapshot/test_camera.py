@@ -217,3 +217,14 @@ def test_a_point_lands_where_blender_says(stage):
     left, right, bottom, top = camera.frame
     ours = ((-x / depth - left) / (right - left), (-y / depth - bottom) / (top - bottom))
     assert ours == pytest.approx(world_to_camera_view(stage.scene, placed, point)[:2], abs=1e-5)
+
+
+def test_a_sheared_camera_is_told_of(stage):
+    placed = stage.camera()
+    placed.rotation_euler = (1.2, 0.1, 0.2)
+    parent = stage.link("Parent")
+    placed.parent, parent.scale = parent, (2.0, 2.0, 2.0)
+    assert not stage.take().notes
+    parent.scale = (2.0, 1.0, 1.0)
+    (note,) = stage.take().notes
+    assert note.subject == "Camera 'Camera'" and "shears" in note.text

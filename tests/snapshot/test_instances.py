@@ -156,6 +156,15 @@ def test_slots_linked_to_the_object_give_each_instance_its_materials(stage):
     assert shown == [("A", "ours"), ("C", "ours"), ("B", "theirs")]
 
 
+def test_an_empty_slot_of_the_object_hides_the_material_of_the_mesh(stage):
+    data = stage.mesh()
+    data.materials.append(bpy.data.materials.new("ours"))
+    stage.link("A", data)
+    other = stage.link("B", data)
+    other.material_slots[0].link, other.material_slots[0].material = "OBJECT", None
+    assert {one.object_name: one.materials[0] == 0 for one in stage.take().instances} == {"A": False, "B": True}
+
+
 def test_an_empty_slot_shows_the_default_material(stage):
     data = stage.mesh()
     data.materials.append(None)
