@@ -115,11 +115,11 @@ def shown_sum(frame: Frame, path: str) -> Iterator[images.Image]:
     """
     name = f"radiance.{path}"
     if not frame.settings.schedule.shows_each or frame.samples_done >= min(FEW, frame.settings.samples):
-        yield frame.to_show(name)
+        yield frame.held.to_show(name)
         return
     with ExitStack() as stack:
         near, far, shown = (stack.enter_context(images.borrowed(*frame.size, "RGBA32F")) for _ in range(3))
-        _mean(frame, MEAN_OF_REFLECTED, frame.to_show(name), near, 1, "color.diffuse")
+        _mean(frame, MEAN_OF_REFLECTED, frame.held.to_show(name), near, 1, "color.diffuse")
         _mean(frame, MEAN_AGAIN, near.colors[0], far, APART, "color.diffuse")
         textures = {"surface_diffuse": frame.images["color.diffuse"], "arriving": far.colors[0]}
         passes.fullscreen(REFLECT, shown, textures=textures)

@@ -69,10 +69,10 @@ def resolve(frame: Frame) -> images.Image:
     paths = tuple(
         path.name
         for path in LIGHT_PATHS
-        if path.image in frame.shown or (path.image in frame.images and held_apart(frame, path))
+        if path.image in frame.held.shown or (path.image in frame.images and held_apart(frame, path))
     )
     with shown_sum(frame, "diffuse_indirect") as indirect:
-        textures = {name: frame.to_show(f"radiance.{name}") for name in paths}
+        textures = {name: frame.held.to_show(f"radiance.{name}") for name in paths}
         if "diffuse_indirect" in paths:
             textures["diffuse_indirect"] = indirect
         if TOGETHER in frame.images:

@@ -2,7 +2,7 @@
 
     together = sum over these paths of their light,  alpha = coverage - what of the world shows through clear glass
 
-A pass that is asked for, and what a technique filters by itself (Denoise), keep their paths apart (Frame.is_apart). The
+A pass that is asked for, and what a technique filters by itself (Denoise), keep their paths apart (Held.is_apart). The
 pass that collects what needs no light adds the sample's light on its way, so that summing costs no pass of its own; at
 other points of the film light is summed where it is carried over (shaders/film/between.frag.glsl).
 
@@ -52,16 +52,16 @@ def collected(frame: Frame) -> tuple[str, ...]:
 
 
 def _collected(frame: Frame) -> tuple[str, ...]:
-    held = tuple(name for name in COLLECTED if frame.is_apart(name))
-    summed = any(path.origin != MEDIUM and not frame.is_apart(path.image) for path in LIGHT_PATHS)
+    held = tuple(name for name in COLLECTED if frame.held.is_apart(name))
+    summed = any(path.origin != MEDIUM and not frame.held.is_apart(path.image) for path in LIGHT_PATHS)
     return (TOGETHER, *held) if summed and len(held) <= MOST_COLLECTED else held
 
 
 def held_apart(frame: Frame, path: LightPath) -> bool:
     """Whether a picture's light of this path has sums of its own."""
-    if path.origin == MEDIUM or frame.is_apart(path.image) or TOGETHER not in collected(frame):
+    if path.origin == MEDIUM or frame.held.is_apart(path.image) or TOGETHER not in collected(frame):
         return True
-    return path.lobe == "transmission" and frame.owned(IN_MEDIA)
+    return path.lobe == "transmission" and frame.plan.owns(IN_MEDIA)
 
 
 def apart_of(frame: Frame, origin: str = SURFACE) -> tuple[str, ...]:

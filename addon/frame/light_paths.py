@@ -2,11 +2,11 @@
 
 Radiance is split as Cycles splits its render passes, so that each path is compared with Cycles' own. Techniques add
 the light of a path to the image `radiance.NAME`. Which paths a picture holds apart is asked of its frame
-(Frame.is_apart): those that its passes show or a technique looks at. The sum of all others is the image TOGETHER.
+(Held.is_apart): those that its passes show or a technique looks at. The sum of all others is the image TOGETHER.
 
 Some techniques take over a kind of *transport* as a whole (Technique.owns), whatever path it ends in: light that
 mirrors and glass focus on surfaces, light in media, light below surfaces. What else would bring such light asks
-`frame.owned(kind)` and leaves it out, so that nothing is counted twice.
+`frame.plan.owns(kind)` and leaves it out, so that nothing is counted twice.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..gfx import images, passes
-from ..gfx.readback import Readback, Reading
+from ..gfx import images
+from ..gfx.readback import Readback
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
@@ -34,13 +34,14 @@ from ..snapshot.scene import Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
 from ..sources.lights import Emitter, emitters
+from .account import Account
 from .bands import Bands
+from .held import Held
 from .history import Before
 from .ledger import Ledger
 from .plan import Plan
 from .settings import Settings
-from .technique import Service, Technique, Write
-from .texel_counters import TexelCounters
+from .technique import Service, Technique
 
 ServiceT = TypeVar("ServiceT", bound=Service)
 SharedT = TypeVar("SharedT")
@@ -61,7 +62,8 @@ class Frame:
     geometry: SceneGeometry
     materials: MaterialSet
     environment: Environment
-    images: dict[str, images.Image]
+    images: dict[str, images.Image]  # those of `held`, by name
+    held: Held
     profiler: Profiler
     ledger: Ledger
     view_block: Block
@@ -80,26 +82,22 @@ class Frame:
     first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
     drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
     find_receivers: Callable[[], Receivers] | None = None
-    counters: dict[str, dict[str, int]] = field(default_factory=dict)
+    account: Account = field(default_factory=Account)  # what techniques tell of their work
     shared_out: Bands | None = None  # for a picture that is drawn between other work
-    shown: dict[str, str] = field(default_factory=dict)  # by sum of samples: the other sum that is shown instead
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
-    needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
-    choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
-    more_writes: list[Write] = field(default_factory=list)  # see `add_write`
     read_last: set[str] = field(default_factory=set)  # images of the last sample that `end` reads; said in `begin`
     before: Before | None = None  # the picture before this one, where techniques remember it
     first_rows: np.ndarray | None = None  # `view_rows` of the first sample
-    carried: dict[str, images.Image] = field(default_factory=dict)  # ranked pairs of other frames; see `empty`
     readback: Readback = field(default_factory=Readback)
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
-    _targets: dict[tuple[str, ...], images.Target] = field(default_factory=dict)
     _hierarchies: dict[tuple, Hierarchy | None] = field(default_factory=dict)  # of this frame, see `hierarchy`
     _receivers: Receivers | None = None
     _film_offsets: dict[int, tuple[float, float]] = field(default_factory=dict)
-    _texel_counters: TexelCounters = field(default_factory=TexelCounters)
+
+    def __post_init__(self):
+        self.target, self.count = self.held.target, self.account.count  # asked for in each pass
 
     @cached_property
     def size(self) -> tuple[int, int]:
@@ -126,43 +124,23 @@ class Frame:
             self._receivers, self.find_receivers = self.find_receivers(), None
         return self._receivers
 
-    def read_later(self, image: images.Image) -> Reading:
-        """Read an image of the pool, together with others, when one of them is asked for; the pool gets it back."""
-        return self.readback.later(image)
-
-    def is_apart(self, name: str) -> bool:
-        """Whether anybody looks at this sum over samples by itself: whoever asked for the picture, or a technique."""
-        return self.settings.shows is None or name in self._looked_at
-
-    @cached_property
-    def _looked_at(self) -> frozenset[str]:
-        needs = (technique.looks_at(self.settings) for technique in self.plan.techniques)
-        return self.settings.shows.union(*needs)
-
     @cached_property
     def emitters(self) -> list[Emitter]:
         """The scene's lights that give something, in an order of their own."""
         return emitters(self.snapshot, self.geometry.origin, self.lamp_maps)
 
-    def random(self, use: str) -> tuple[float, float]:
-        """This sample's point of the sequence for `use`."""
-        return point(self.sample, use, self.settings.seed)
-
-    def random_at(self, index: int, use: str) -> tuple[float, float]:
-        """Point `index` of the sequence for `use`, for uses that take more or fewer points than samples."""
-        return point(index, use, self.settings.seed)
+    def random(self, use: str, at: int | None = None) -> tuple[float, float]:
+        """This sample's point of the sequence for `use`; or the point number `at`, for uses that take more or fewer
+        points than samples."""
+        return point(self.sample if at is None else at, use, self.settings.seed)
 
     def uniform(self, use: str) -> float:
         """A number of this sample that chooses among things, of which the chosen one then draws a point."""
         return uniform(self.sample, use, self.settings.seed)
 
-    def random_volume_at(self, index: int, use: str) -> tuple[float, float, float]:
-        """The same with a third number."""
-        return *self.random_at(index, use), third(index, use, self.settings.seed)
-
-    def random_volume(self, use: str) -> tuple[float, float, float]:
-        """The same with a third number."""
-        return *self.random(use), third(self.sample, use, self.settings.seed)
+    def random_volume(self, use: str, at: int | None = None) -> tuple[float, float, float]:
+        """A point with a third number."""
+        return *self.random(use, at), third(self.sample if at is None else at, use, self.settings.seed)
 
     def look(self, lens: tuple[float, float] | None = None, film: int | None = None) -> None:
         """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its
@@ -197,7 +175,7 @@ class Frame:
         """Where point `number` of the film lies, in pixels from a pixel's middle."""
         found = self._film_offsets.get(number)
         if found is None:
-            width, (x, y) = self.snapshot.film.filter_width, self.random_at(number, FILM)
+            width, (x, y) = self.snapshot.film.filter_width, self.random(FILM, number)
             found = blackman_harris_offset(x, width), blackman_harris_offset(y, width)
             self._film_offsets[number] = found
         return found
@@ -219,18 +197,6 @@ class Frame:
         seen = self.receivers is not None and len(self.receivers.distance)
         reach = FAR_BEYOND * self.typical_distance if seen else np.inf
         return 1e-6 * min(self.geometry.size, reach)
-
-    @cached_property
-    def blocker_sets(self) -> frozenset[frozenset[int]]:
-        """Groups of blockers that lights let pass, all that differ."""
-        snapshot = self.snapshot
-        return frozenset(one.links.passing for one in (*snapshot.lights, *snapshot.instances) if one.links.passing)
-
-    @cached_property
-    def lights_are_linked(self) -> bool:
-        """Whether a light leaves out receivers, or some objects do not block it."""
-        givers = (*self.snapshot.lights, *self.snapshot.instances)
-        return any(one.links.unlit or one.links.passing for one in givers)
 
     @cached_property
     def measured_materials(self) -> list[CompiledMaterial]:
@@ -277,85 +243,13 @@ class Frame:
             self.lasting[kind] = kind()
         return self.lasting[kind]
 
-    def owned(self, transport: str) -> bool:
-        """Whether a technique of the plan takes over this kind of transport (light_paths.TRANSPORTS)."""
-        return self.plan.owner(transport) is not None
-
-    @property
-    def shown_with(self) -> tuple:
-        """What decides how the samples so far are shown: where it differs, `show` shows them otherwise."""
-        showing = [technique for technique in self.plan.techniques if technique.only_shows]
-        return tuple((t.name, self.settings.of(t), self.snapshot.moment) for t in showing)
-
-    def count(self, technique: Technique, name: str, amount: int = 1) -> None:
-        """Add to a counter of the technique's ledger row."""
-        row = self.counters.setdefault(technique.name, {})
-        row[name] = row.get(name, 0) + amount
-
-    def chose(self, technique: Technique, of: str, why: str) -> None:
-        """Between methods, by what they cost on this device: the ledger's row says it."""
-        self.choices.setdefault(technique.name, {})[of] = why
-
-    def count_texel(
-        self, technique: Technique, name: str, image: images.Image, factor: int = 1, at: tuple[int, int] = (0, 0)
-    ) -> None:
-        """Add the first number of an image's texel, times `factor`, to a counter, without reading it now: it comes with
-        the picture. Sums below 2^24 are exact."""
-        self._texel_counters.add((technique.name, name, factor), image, at)
-
-    def read_with_counters(self, image: images.Image | None) -> np.ndarray | None:
-        """An image's pixels; what `count_texel` has counted is read with them, and added to the counters."""
-        pixels, found = self._texel_counters.read(image)
-        for (technique, name, factor), amount in found:
-            if amount > 0.0:  # as with `count`: what did not happen is not counted
-                row = self.counters.setdefault(technique, {})
-                row[name] = row.get(name, 0) + factor * round(amount)
-        return pixels
-
-    def add_write(self, write: Write) -> images.Image:
-        """An image that this picture alone has, as for passes that its view layer asks for by name; empty.
-        In `begin`."""
-        if write.name not in self.images:
-            self.images[write.name] = images.pool.take(*self.size, write.format)
-            self.more_writes.append(write)
-        self.empty(write)
-        return self.images[write.name]
-
-    def empty(self, write: Write) -> None:
-        """Make an image of a write ready for the first sample: without light, and with no pairs of ids and weights but
-        those of the time steps before, since pairs of two images cannot be added pixel by pixel."""
-        before = self.carried.get(write.name)
-        if before is None:
-            self.target(write.name).clear()
-        else:
-            passes.copy(before, self.target(write.name))
-
-    @property
-    def writes(self) -> list[Write]:
-        """What the plan's techniques write, and what was added for this picture."""
-        return [*(write for technique in self.plan.techniques for write in technique.writes), *self.more_writes]
-
-    @property
-    def sums(self) -> set[str]:
-        """Names of what adds up over samples."""
-        return {write.name for write in self.writes if write.accumulates}
-
     def drop(self) -> None:
         """Give back the images of the frame."""
         self.readback.drop()
-        self._texel_counters.drop()
+        self.account.drop()
         if self.before is not None:
             self.before.drop()
-        for image in self.images.values():
-            images.pool.give(image)
-
-    def leave(self, technique: Technique, reason: str) -> None:
-        """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
-        self.needless[technique.name] = reason
-
-    def to_show(self, name: str) -> images.Image:
-        """The image of that name, or, of sums, the one that shows them better."""
-        return self.images[self.shown.get(name, name)]
+        self.held.drop()
 
     def bands(self, technique: Technique, part: str = "") -> Iterator[tuple[int, int]]:
         """Rows (from, to) of the picture: a long pass draws them one after the other, with a `yield` after each.
@@ -364,12 +258,3 @@ class Frame:
         """
         height = self.size[1]
         return iter([(0, height)]) if self.shared_out is None else self.shared_out.split(technique.name + part, height)
-
-    def target(self, *names: str, depth: str = "") -> images.Target:
-        """A render target over named images; kept with the frame."""
-        key = (*names, "depth:" + depth)
-        if key not in self._targets:
-            self._targets[key] = images.Target(
-                tuple(self.images[name] for name in names), self.images[depth] if depth else None
-            )
-        return self._targets[key]

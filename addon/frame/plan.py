@@ -36,6 +36,15 @@ class Plan:
         """The technique that owns a kind of transport (light_paths.TRANSPORTS), if one does."""
         return next((technique for technique in self.techniques if transport in technique.owns), None)
 
+    def owns(self, transport: str) -> bool:
+        """Whether a technique that runs takes over this kind of transport."""
+        return self.owner(transport) is not None
+
+    def shown_with(self, snapshot: Snapshot, settings: Settings) -> tuple:
+        """What decides how the samples so far are shown: where it differs, `show` shows them otherwise."""
+        showing = [technique for technique in self.techniques if technique.only_shows]
+        return tuple((t.name, settings.of(t), snapshot.moment) for t in showing)
+
     def last_writer(self, image: str) -> Technique | None:
         """The technique that writes an image after all others."""
         writers = [t for t in self.techniques if any(write.name == image for write in t.writes)]

@@ -30,7 +30,8 @@ from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
 from . import device_probe, history, left_out
 from . import ledger as ledger_module
-from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
+from .held import Held
+from .ledger import REUSED, Ledger, Row
 from .picture import Frame
 from .plan import Plan, make_plan
 from .settings import Settings
@@ -124,7 +125,7 @@ class Renderer:
             ledger.rows += plan.skipped
             self.frame.ledger = ledger
             self.frame.profiler = Profiler(settings.profile)
-            self.frame.counters = {}
+            self.frame.account.counters = {}
             self.frame.settings = replace(settings, seed=self.frame.settings.seed)  # see frame/history.py
             self.frame.snapshot = snapshot  # the same but for what only `show` asks for, as the time
             return self.frame
@@ -139,9 +140,10 @@ class Renderer:
         if self._view_block is None:
             self._view_block = Block(VIEW, **values)
         self._view_block.answers = ANSWERS if snapshot.camera.panorama else ()
+        held = Held(plan, settings, view.size)
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
-            {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
+            held.images, held, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
             self._surface_means, self._opacity, self._glow, self._lamp_maps, lasting=self._lasting,
             before=before,
         )  # fmt: skip
@@ -149,8 +151,8 @@ class Renderer:
         environment.guide(None)
         for technique in plan.techniques:
             for write in technique.writes:
-                if write.name not in frame.images and not write.by_need:
-                    frame.images[write.name] = images.pool.take(*frame.size, write.format)
+                if not write.by_need:
+                    held.take(write)
         for technique in plan.techniques:
             wanted = technique.key(snapshot, asked)
             if technique.name not in self._keys or self._keys[technique.name] != wanted:
@@ -194,7 +196,7 @@ class Renderer:
         if frame.samples_done or frame.number_of(0):
             frame.sample = frame.number_of(frame.samples_done)
             frame.look()
-            frame.shown.clear()
+            frame.held.shown.clear()
         with profiler.measured(frame.samples_done, measured):
             yield from _stage(frame, "sample")
         if frame.samples_done + 1 == settings.samples and frame.numbers is None:
@@ -233,8 +235,8 @@ class Renderer:
     def _begin_samples(self, frame: Frame) -> Iterator[None]:
         frame.sample = 0
         frame.look()
-        frame.shown.clear()
-        self._clear_sums(frame)
+        frame.held.shown.clear()
+        frame.held.empty_sums()
         yield from _stage(frame, "begin")
 
     def merge(self, frame: Frame, sums: dict[str, np.ndarray]) -> None:
@@ -255,7 +257,7 @@ class Renderer:
         """The mean of the samples so far as the image that is to be shown: scene-linear, premultiplied by alpha; None
         where no technique of the plan makes it. It changes with the next call. No sample may be half drawn."""
         frame.picture = Frame.picture
-        frame.needless.clear()
+        frame.account.needless.clear()
         for _ in _stage(frame, "show"):
             pass
         return frame.images.get(frame.picture)
@@ -273,20 +275,20 @@ class Renderer:
         started = time.perf_counter()
         first = next((name for name in names if name in frame.images), None)
         if first is None:
-            frame.read_with_counters(None)
+            frame.account.read(None)
             images.finish()
         else:  # the wait for the GPU, with what comes of it first
-            read = frame.read_with_counters(frame.to_show(first))
+            read = frame.account.read(frame.held.to_show(first))
         waited = time.perf_counter()
-        sums = frame.sums
+        sums = frame.held.sums
         out, bad = {}, 0
         for name in names:
-            if name in sums and not frame.is_apart(name):
+            if name in sums and not frame.held.is_apart(name):
                 raise KeyError(f"{name} is not held apart: settings.shows must name it when the picture begins.")
             if name not in frame.images:  # no technique of the plan brings such light
                 out[name] = np.zeros((*frame.size[::-1], 4), np.float32)
                 continue
-            pixels = read if name == first else images.read(frame.to_show(name))
+            pixels = read if name == first else images.read(frame.held.to_show(name))
             finite = np.isfinite(pixels)
             if not finite.all():
                 bad += int(pixels.size - finite.sum())
@@ -300,15 +302,11 @@ class Renderer:
         took = frame.drawn_s + frame.profiler.awaited + waited - started
         spent = frame.profiler.shares([t.name for t in frame.plan.techniques], took)
         if ledger.rows:  # reused but for what was done to show them
-            worked = frame.counters.keys() | frame.needless.keys()
-            shown = {
-                t.name: self._row(frame, t, spent[t.name])
-                for t in frame.plan.techniques
-                if t.only_shows and t.name in worked
-            }
+            worked = frame.account.counters.keys() | frame.account.needless.keys()
+            shown = {t.name: _row(frame, t, spent) for t in frame.plan.techniques if t.only_shows and t.name in worked}
             ledger.rows = [shown.get(row.name, row) for row in ledger.rows]
         else:
-            rows = [self._row(frame, t, spent[t.name]) for t in frame.plan.techniques]
+            rows = [_row(frame, t, spent) for t in frame.plan.techniques]
             ledger.rows = rows + list(frame.plan.skipped)
             ledger.times["passes"] = took
         ledger.times["readback"] = time.perf_counter() - waited
@@ -318,15 +316,6 @@ class Renderer:
         if self.publishes:
             ledger_module.publish(ledger)
         return out
-
-    @staticmethod
-    def _row(frame: Frame, technique: Technique, seconds: float) -> Row:
-        slot = ", ".join(frame.plan.slots_of(technique))
-        if technique.name in frame.needless:
-            return Row(technique.name, technique.label, SKIPPED, frame.needless[technique.name], slot=slot)
-        counters = frame.counters.get(technique.name, {})
-        chosen = tuple(f"{of}: {why}" for of, why in frame.choices.get(technique.name, {}).items())
-        return Row(technique.name, technique.label, RAN, "", 1000 * seconds, slot, counters, chosen)
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -423,14 +412,13 @@ class Renderer:
         )  # fmt: skip
 
     def _clear_all_sums(self, frame: Frame) -> None:
-        self._clear_sums(frame)
-        for name in frame.shown.values():
+        frame.held.empty_sums()
+        for name in frame.held.shown.values():
             frame.target(name).clear()
 
-    def _clear_sums(self, frame: Frame) -> None:
-        for write in frame.writes:
-            if (write.accumulates or write.ranked) and write.name in frame.images:
-                frame.empty(write)
+
+def _row(frame: Frame, technique: Technique, spent: dict[str, float]) -> Row:
+    return frame.account.row(technique, ", ".join(frame.plan.slots_of(technique)), spent[technique.name])
 
 
 def _for_nothing(_snapshot: Snapshot, _settings: Settings) -> None:

@@ -174,7 +174,7 @@ class Turns:
         names = [*(path.image for path in LIGHT_PATHS), "surface.emission"]  # that the film adds after all others
         lights = [frame.images[name] for name in names if name in frame.images]
         self._measure(frame, self._most, lights)
-        self._reading, self._tiles = frame.read_later(self._tiles.colors[0]), None
+        self._reading, self._tiles = frame.readback.later(self._tiles.colors[0]), None
 
     def _decide(self, frame: Frame) -> None:
         self._asks, self._samples = False, frame.settings.samples
@@ -193,7 +193,9 @@ class Turns:
             if len(weights) < self._samples:
                 which = f"bounce {part + 1}" if self._measured > 1 else "its light"
                 often = f"in {len(weights)} of {self._samples} samples"
-                frame.chose(self._technique, which, f"{often}, because it may bring {_percent(share)} of the error")
+                frame.account.chose(
+                    self._technique, which, f"{often}, because it may bring {_percent(share)} of the error"
+                )
 
     def drop(self) -> None:
         """Forget the picture. What is to be read belongs to that."""

@@ -162,7 +162,7 @@ class Technique:
         return False
 
     def looks_at(self, settings: Settings) -> tuple[str, ...]:
-        """Sums over samples of light paths, colours and normals that it needs by themselves (Frame.is_apart)."""
+        """Sums over samples of light paths, colours and normals that it needs by themselves (Held.is_apart)."""
         return ()
 
     def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:

@@ -94,7 +94,7 @@ class Sums:
         """Take over what the samples of a step have summed up."""
         for name, image in sums_of(frame).items():
             _add(image, self.whole, name)
-        for write in frame.writes:
+        for write in frame.held.writes:
             if write.ranked:
                 _copy(frame.images[write.name], self.ranked, write.name)
         self.samples += frame.samples_done
@@ -115,7 +115,7 @@ class Sums:
                 frame.images[name] = images.pool.take(*frame.size, image.format)
                 frame.target(name).clear()
             if name not in own and name.startswith("film."):
-                frame.shown[name.replace("film.", "radiance.")] = name
+                frame.held.shown[name.replace("film.", "radiance.")] = name
             put(image, frame.target(name), 0, 0, "ADDITIVE_PREMULT")
         for name, image in self.half.items():
             if name in frame.images:
@@ -132,7 +132,7 @@ class Sums:
 
 def sums_of(frame: Frame) -> dict[str, images.Image]:
     """Images in which the samples of a frame add up."""
-    names = {frame.shown.get(name, name) for name in frame.sums}
+    names = {frame.held.shown.get(name, name) for name in frame.held.sums}
     return {name: frame.images[name] for name in sorted(names) if name in frame.images}
 
 
@@ -181,7 +181,7 @@ def drawn(
                     renderer.forget()
                     renderer.begin(step.snapshot, settings, step.numbers)
             frame = renderer.frame
-            frame.carried = sums.ranked
+            frame.held.carried = sums.ranked
             first = sum(number < half for number in step.numbers)
             halved = first == 0
             for _ in parts(renderer, frame):

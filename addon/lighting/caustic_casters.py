@@ -153,7 +153,7 @@ def of(frame: Frame) -> Casters | None:
     """The casters that a technique of this picture answers for; None where the slot is empty."""
     shared = frame.shared(Answered)
     if not shared.known:
-        found = casters_of(frame.snapshot) if frame.owned(LIGHT_SPECULAR_DIFFUSE) else None
+        found = casters_of(frame.snapshot) if frame.plan.owns(LIGHT_SPECULAR_DIFFUSE) else None
         shared.casters, shared.known = found if isinstance(found, Casters) else None, True
         if shared.casters is not None and WORLD in shared.casters.lights and frame.plan.runs("environment_light"):
             shared.bright = bright_part(frame.environment)

@@ -130,7 +130,7 @@ class CausticMaps:
         self._lasting = lasting
         self.lights = set(resting)
         self._sample = weakref.ref(frame), frame.sample
-        self._shift = np.array(frame.random_at(frame.sample, "caustics/map"))
+        self._shift = np.array(frame.random("caustics/map", frame.sample))
 
     def done(self) -> None:
         """Nobody asks for the maps in this sample any more."""

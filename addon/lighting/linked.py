@@ -69,7 +69,7 @@ def find_groups(frame: Frame, numbers: images.Image, groups: images.Target) -> N
 def linked_at_hits(frame: Frame, program: Program) -> Program:
     """The same pass of shaders/indirect/path.glsl, for the links that the frame's lights have: what rays meet is lit by
     those that light it, through what does not block them."""
-    return _linked_at_hits(program) if frame.lights_are_linked else program
+    return _linked_at_hits(program) if frame.snapshot.lights_are_linked else program
 
 
 @cache

@@ -97,14 +97,14 @@ class PathSources:
         if self._triangles is not None:
             for k in range(self.emissive_points):
                 index = frame.sample * self.emissive_points + k
-                drawn = frame.random_volume_at(index, f"{self.use}/emissive")
+                drawn = frame.random_volume(f"{self.use}/emissive", index)
                 blocked = lights.GLASS_BLOCKS_FLAG * (MESHES in by_photons)
                 rows.append(self._triangles.row(drawn, self.emissive_points, lights.SHADOW_FLAG + blocked))
         if self.world_flags:
             seen = lights.SHADOW_FLAG + self.world_flags
             bright = bright_world(frame) if WORLD in by_photons else None
             numbers = range(frame.sample * self.directions, (frame.sample + 1) * self.directions)
-            chosen = np.array([frame.random_at(index, f"{self.use}/world") for index in numbers]).reshape(-1, 2)
+            chosen = np.array([frame.random(f"{self.use}/world", index) for index in numbers]).reshape(-1, 2)
             for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
                 light = radiance / density
                 blocked = lights.GLASS_BLOCKS_FLAG * (bright is not None and bright.holds(radiance))

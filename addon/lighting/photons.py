@@ -225,8 +225,8 @@ class Photons:
             texels = max(round(grid / np.sqrt(parts)), least)
             for number in range(index * parts, (index + 1) * parts):
                 middle = alone and parts == 1
-                sample = emitter.middle() if middle else emitter.sample(*frame.random_volume_at(number, "light"))
-                shift = frame.random_at(number, "caustics/grid")
+                sample = emitter.middle() if middle else emitter.sample(*frame.random_volume("light", number))
+                shift = frame.random("caustics/grid", number)
                 for low, high in boxes:
                     for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):
                         shared = emitter, sample, view, lobes, number, count * parts, weight / parts
@@ -319,10 +319,10 @@ class Photons:
         emitter, view, count = light.emitter, light.view, light.count
         share = float(count) ** -0.5
         wide = _half_width(emitter)
-        u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
+        u, later = frame.random("caustics/lobe", light.index), frame.random("caustics/interface", light.index)
         passing, mirroring = np.ones(4), 1.0
         if light.strata > 1:  # evenly, moved by the same for all: each part has one number at each interface
-            moved = frame.random_at(0, "caustics/interface")[1]
+            moved = frame.random("caustics/interface", 0)[1]
             later = later[0], (lattice(light.index, light.strata) + moved) % 1.0
             passing, mirroring = balanced(light, moved)
         strata = float(light.strata)
@@ -331,7 +331,7 @@ class Photons:
         # Of several lobes each by itself: one alone would tint all.
         parts = self._parts if count < FEW_LOBES or light.strata < 0 else 1
         sources = self._sources.set([emitter.row(light.sample, 0, 0, light.weight / parts)])
-        choice = frame.random_volume_at(light.index, "caustics/interface")[2]
+        choice = frame.random_volume("caustics/interface", light.index)[2]
         if parts > 1 and light.strata > 0:
             choice = (light.index % light.strata + 0.5) / light.strata
         drawn = (

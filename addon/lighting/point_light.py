@@ -113,7 +113,7 @@ class PointLight:
         for emitter, weight in chosen:
             each, narrow = self._points(frame, 1) if emitter.extended else 1, emitter.is_narrow(frame.receivers)
             for number in range(sample_number * each, (sample_number + 1) * each):
-                drawn = frame.random_volume_at(number, f"{self._use}/light")
+                drawn = frame.random_volume(f"{self._use}/light", number)
                 sample = emitter.narrow_sample(*drawn[:2]) if narrow else emitter.sample(*drawn)
                 points = self._sharpness * each * settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
@@ -127,7 +127,7 @@ class PointLight:
             return
         each = self._points(frame, self._others)
         numbers = range(sample_number * each, (sample_number + 1) * each)
-        drawn = np.array([frame.random_at(number, f"{self._use}/world") for number in numbers])
+        drawn = np.array([frame.random(f"{self._use}/world", number) for number in numbers])
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.EVEN_FLAG * world.even
         for direction, radiance, density in zip(*frame.environment.draw(*drawn.T)):
             yield lights.direction_row(direction, radiance / density, density, flags, 0, 1, each)
@@ -137,7 +137,7 @@ class PointLight:
             return
         each = self._points(frame, self._others)
         for number in range(sample_number * each, (sample_number + 1) * each):
-            numbers = frame.random_volume_at(number, f"{self._use}/emissive")
+            numbers = frame.random_volume(f"{self._use}/emissive", number)
             samples = self._sharpness * frame.settings.samples
             yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=samples)
 

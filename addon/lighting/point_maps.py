@@ -141,7 +141,7 @@ class PointMaps(Technique, VisibilityProvider):
 
     def jitter(self, frame: Frame, emitter: lights.Emitter, number: int) -> tuple[float, float, float, float]:
         """Shift and turn of the maps of point `number`."""
-        return (*frame.random_at(number, "map"), *frame.random_at(number, "map/turn"))
+        return (*frame.random("map", number), *frame.random("map/turn", number))
 
     def most_texels(self, frame: Frame) -> int:
         """Of the views of a round."""

@@ -132,7 +132,7 @@ class SoftMaps(PointMaps):
         """Where the number of points is known and even, parts that tile the light: 2^k points lie in one each."""
         if not (frame.settings.get(self, "refine") and frame.settings.schedule.known_total and points == round(points)):
             return None
-        return emitter.part(*frame.random_at(number, "light"), round(points))
+        return emitter.part(*frame.random("light", number), round(points))
 
     def resolution(self, frame: Frame) -> int:
         """A power of two, so that no entry of the pyramid lies in two views."""

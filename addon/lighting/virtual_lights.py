@@ -218,8 +218,8 @@ class VirtualLights:
             held.append(densities)
             yield
             self._make_image(frame, grid, {**found, "slots": slots, "radiances": radiances, "densities": densities})
-            frame.count_texel(technique, "virtual lights", kept_before, at=choice.last)
-            frame.count_texel(technique, "density rays", kept_before, grid.count, at=choice.last)
+            frame.account.count_texel(technique, "virtual lights", kept_before, at=choice.last)
+            frame.account.count_texel(technique, "density rays", kept_before, grid.count, at=choice.last)
         finally:
             for image in held:
                 images.pool.give(image)
@@ -287,10 +287,10 @@ class VirtualLights:
         if self._emissive is not None:
             flags = lights.SHADOW_FLAG + lights.GLASS_BLOCKS_FLAG * meshes_answered(frame)
             for index in numbers:
-                drawn = frame.random_volume_at(index, "virtual lights/emissive")
+                drawn = frame.random_volume("virtual lights/emissive", index)
                 rows.append(self._emissive.row(drawn, share, flags, samples=total / share, at_hits=True))
         if self._world:
-            chosen = np.array([frame.random_at(index, "virtual lights/world") for index in numbers])
+            chosen = np.array([frame.random("virtual lights/world", index) for index in numbers])
             bright = bright_world(frame)
             for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
                 blocked = lights.GLASS_BLOCKS_FLAG * (bright is not None and bright.holds(radiance))
@@ -315,7 +315,7 @@ class VirtualLights:
             points = each if emitter.has_span or emitter.radius > 0 else 1
             narrow = emitter.is_narrow(frame.receivers)
             for k in range(points):
-                drawn = frame.random_volume_at(frame.sample * points + k, "virtual lights/light")
+                drawn = frame.random_volume("virtual lights/light", frame.sample * points + k)
                 sample = emitter.narrow_sample(*drawn[:2]) if narrow else emitter.sample(*drawn)
                 total = points * frame.settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)

@@ -235,7 +235,7 @@ def by_rays(
     far_off = found.by_rays and _far_off(frame)
     if technique is not None:
         why = "maps, because rays begin too far off surfaces in so large a scene" if far_off else found.why
-        frame.chose(technique, of, why)
+        frame.account.chose(technique, of, why)
     return found.by_rays and not far_off
 
 

@@ -310,7 +310,7 @@ class HierarchyCache:
             trees = self._built(shown, key[1], look, origin)
         if self._kept.get(key) is not trees:
             # At most one for each path; the oldest one, of another scene, goes.
-            most = 3 + len(frame.blocker_sets)
+            most = 3 + len(frame.snapshot.blocker_sets)
             self._kept = dict([*self._kept.items()][-most:]) | {key: trees}
         if trees.hierarchy.instances != shown:  # else the same object: what was made of it still stands
             trees.hierarchy = replace(trees.hierarchy, instances=shown)

@@ -39,7 +39,6 @@ class SceneOnGpu(Protocol):
     measured_materials: list[CompiledMaterial]
     opacity_maps: OpacityMaps
     emission_maps: EmissionMaps
-    blocker_sets: frozenset[frozenset[int]]
     settings: Drawn
     view_block: Block
     offset_size: float

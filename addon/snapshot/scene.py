@@ -416,6 +416,16 @@ class Snapshot:
         return frozenset(slot for slots in self.material_sets for slot in slots)
 
     @cached_property
+    def blocker_sets(self) -> frozenset[frozenset[int]]:
+        """Groups of blockers that lights let pass, all that differ."""
+        return frozenset(one.links.passing for one in (*self.lights, *self.instances) if one.links.passing)
+
+    @cached_property
+    def lights_are_linked(self) -> bool:
+        """Whether a light leaves out receivers, or some objects do not block it."""
+        return any(one.links.unlit or one.links.passing for one in (*self.lights, *self.instances))
+
+    @cached_property
     def material_sets(self) -> frozenset[tuple[int, ...]]:
         """What instances have in their slots."""
         return frozenset(one.materials for one in self.instances)

@@ -358,7 +358,7 @@ class Hits:
             with images.borrowed(1, 1, "R32F") as count:
                 number_of_all = {"material_count": len(frame.materials.compiled)}
                 passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
-                frame.count_texel(technique, "materials", count.colors[0])
+                frame.account.count_texel(technique, "materials", count.colors[0])
         frame.count(technique, "programs", len(leaders))
         frame.count(technique, "passes", len(leaders) + 1)
 

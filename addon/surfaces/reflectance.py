@@ -55,7 +55,7 @@ class Reflectance:
     def update(self, frame: Frame) -> None:
         """Draw anew the materials that have changed or whose surfaces have."""
         self._update(frame)
-        owned = MIRRORS_OWNED if frame.owned(LIGHT_SPECULAR_DIFFUSE) else ()
+        owned = MIRRORS_OWNED if frame.plan.owns(LIGHT_SPECULAR_DIFFUSE) else ()
         self.image.defines = (*owned, *(TURNED if _turns_normals(frame) else ()))
 
     def _update(self, frame: Frame) -> None:

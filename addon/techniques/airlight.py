@@ -227,7 +227,7 @@ class Airlight(Technique):
         """CONSTANTS but for the pixel."""
         return {
             "light_count": lit.rows, "offset_size": frame.offset_size, "world_rows": float(world_directions(frame)),
-            "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)), "hidden_rows": lit.hidden,
+            "glass_blocks": int(frame.plan.owns(LIGHT_SPECULAR_MEDIUM)), "hidden_rows": lit.hidden,
         }  # fmt: skip
 
     def _add_on_rays(self, frame: Frame, technique: Technique, rays: Rays, target: images.Target) -> None:
@@ -319,7 +319,7 @@ class Airlight(Technique):
             # A bulb shines to all sides, which few points on it do not.
             count = FEW_EMISSIVE_POINTS if frame.settings.samples < FEW else EMISSIVE_POINTS
             for k in range(count):
-                drawn = frame.random_volume_at(frame.sample * count + k, "airlight/emissive")
+                drawn = frame.random_volume("airlight/emissive", frame.sample * count + k)
                 samples = count * frame.settings.samples
                 rows.append(triangles.row(drawn, count, lights.SHADOW_FLAG, 1, samples))
         return rows, [emitters[number] for number in chosen]
@@ -330,7 +330,7 @@ class Airlight(Technique):
         rows, count = [], world_directions(frame)
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG * frame.snapshot.world.visibility.diffuse
         for k in range(count):
-            drawn = frame.random_at(frame.sample * count + k, "airlight/world")
+            drawn = frame.random("airlight/world", frame.sample * count + k)
             direction, radiance, density = frame.environment.draw(*drawn)
             rows.append(lights.direction_row(direction, radiance / density, density, flags, 0, 1, count))
         return rows

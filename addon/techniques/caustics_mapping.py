@@ -118,7 +118,7 @@ class CausticsMapping(Technique):
         settings = frame.settings
         side, map_side = settings.get(self, "grid"), settings.get(self, "map_size")
         by_rays = settings.get(self, "by") == RAYS
-        shift = np.array(frame.random_at(frame.sample, "caustics/map"))
+        shift = np.array(frame.random("caustics/map", frame.sample))
         maps = frame.kept(CausticMaps)
         maps.begin(frame, self._photons.resting(frame, self._casters))
         for light in self._photons.views(frame, self._casters, side):

@@ -91,7 +91,7 @@ class Cryptomatte(Technique):
         film = frame.snapshot.film
         for kind in film.cryptomattes:
             for name in film.cryptomatte_names(kind):
-                frame.add_write(Write(name, "RGBA32F", f"Cryptomatte of {kind}s: id, weight, id, weight", ranked=True))
+                frame.held.add(Write(name, "RGBA32F", f"Cryptomatte of {kind}s: id, weight, id, weight", ranked=True))
         placed = frame.geometry.placed[0]
         names = ids_of([one.object_name for one in placed]), ids_of([one.asset or one.object_name for one in placed])
         self._objects = images.upload_list(_columns(*names))

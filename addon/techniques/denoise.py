@@ -219,7 +219,7 @@ class Denoise(Technique):
             return
         for path in self._paths(frame):
             yield from self._filter(frame, path, frame.settings.samples)
-            frame.shown[f"radiance.{path}"] = f"denoise.{path}"
+            frame.held.shown[f"radiance.{path}"] = f"denoise.{path}"
 
     def show(self, frame: Frame) -> None:
         if frame.plan.last_writer(COMBINED) is self:

@@ -114,7 +114,7 @@ class DirectLight(Technique):
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
                 cell = 1.0 if part else provider.cell(frame, number, points)
                 whole = cell >= 1.0 and emitter.extended and emitter.maps is None
-                drawn = frame.random_volume_at(number, "light")
+                drawn = frame.random_volume("light", number)
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*drawn)
                 near = bool(service) and provider.asks_views and cell == 0.0 and emitter.light.key in self._near
@@ -135,9 +135,9 @@ class DirectLight(Technique):
         found = frame.shared(ShadowLinks).of(frame, passing)
         of = f"blockers of {emitter.light.name}"
         if found is None:
-            frame.chose(self, of, f"all objects, since {acceleration.too_many(frame.snapshot)}")
+            frame.account.chose(self, of, f"all objects, since {acceleration.too_many(frame.snapshot)}")
         else:
-            frame.chose(self, of, "rays among its own, whatever technique draws shadows")
+            frame.account.chose(self, of, "rays among its own, whatever technique draws shadows")
         return found
 
     def _has_rays(self, frame: Frame, emitter: lights.Emitter, shadow: VisibilityProvider) -> bool:

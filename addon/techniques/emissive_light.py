@@ -136,7 +136,7 @@ class EmissiveLight(Technique):
         points = []
         for k in range(count):
             number = frame.sample * count + k
-            numbers = frame.random_volume_at(number, "emissive")
+            numbers = frame.random_volume("emissive", number)
             triangle, point, _ = self._triangles.draw(*numbers)
             linked = frame.shared(ShadowLinks).of(frame, self._triangles.passing[triangle])
             if linked:
@@ -173,7 +173,7 @@ class EmissiveLight(Technique):
             return None
         if frame.hierarchy("shadow") is None:
             return None
-        frame.chose(self, "points", "of each pixel's own, because surfaces stand close to emissive meshes")
+        frame.account.chose(self, "points", "of each pixel's own, because surfaces stand close to emissive meshes")
         return images.upload_list(self._triangles.texels())
 
     def _own_rays(self, frame: Frame) -> Maps:
@@ -227,5 +227,5 @@ class EmissiveLight(Technique):
 
 def _views(frame: Frame, point: np.ndarray, number: int, resolution: int) -> list[depth_maps.MapView]:
     """Of the map of a point, which is the picture's point `number`."""
-    jitter = (*frame.random_at(number, "map/emissive"), *frame.random_at(number, "map/emissive/turn"))
+    jitter = (*frame.random("map/emissive", number), *frame.random("map/emissive/turn", number))
     return depth_maps.point_views(point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution)

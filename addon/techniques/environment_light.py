@@ -204,7 +204,7 @@ class EnvironmentLight(Technique):
         points, patches = [], self._patches(frame)
         bright = bright_world(frame)
         numbers = list(rate.points(frame.sample))
-        chosen = np.array([frame.random_at(number, "environment") for number in numbers]).reshape(-1, 2)
+        chosen = np.array([frame.random("environment", number) for number in numbers]).reshape(-1, 2)
         for number, direction, radiance, density in zip(numbers, *frame.environment.draw(*chosen.T), strict=True):
             blocked = bright is not None and bright.holds(radiance)
             asked = flags + lights.GLASS_BLOCKS_FLAG * blocked
@@ -214,7 +214,7 @@ class EnvironmentLight(Technique):
             views = []
             if shadows and not self._traced:
                 jitter = (
-                    *frame.random_at(number, "map/environment"), *frame.random_at(number, "map/environment/turn")
+                    *frame.random("map/environment", number), *frame.random("map/environment/turn", number)
                 )  # fmt: skip
                 views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, jitter, resolution)
                 views = [replace(view, glass_blocks=True) for view in views] if blocked else views
@@ -255,7 +255,7 @@ class EnvironmentLight(Technique):
     @staticmethod
     def _usual_views(frame: Frame, resolution: int) -> list:
         """Of a direction such as the world's are."""
-        direction, *_ = frame.environment.draw(*frame.random_at(0, "environment"))
+        direction, *_ = frame.environment.draw(*frame.random("environment", 0))
         middle = (0.5, 0.5, 0.0, 0.0)
         return depth_maps.directional_views(direction, frame.receivers, frame.geometry, middle, resolution)
 

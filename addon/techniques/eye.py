@@ -128,7 +128,7 @@ class PointSpread(Service):
 
     def leave(self, frame: Frame) -> None:
         """Nobody will ask for a kernel of this picture."""
-        frame.leave(self._technique, "the picture has no light that would dazzle it")
+        frame.account.leave(self._technique, "the picture has no light that would dazzle it")
 
     def _drop(self) -> None:
         for kept in (self._kernel, self._pattern):

@@ -190,7 +190,7 @@ class Film(Technique):
         self._seen = Seen(frame.materials.soft, glossy, world, lights.kinds_of(seen))
         if TOGETHER in self._held:
             paths = ", ".join(path.label for path in LIGHT_PATHS if path.name in self._apart)
-            frame.chose(self, "light paths", f"summed before the filter{f', but for {paths}' if paths else ''}")
+            frame.account.chose(self, "light paths", f"summed before the filter{f', but for {paths}' if paths else ''}")
         self._first_seen(frame)
 
     def sample(self, frame: Frame) -> Iterator[None]:
@@ -207,7 +207,7 @@ class Film(Technique):
                 frame.count(self, "passes", film_filter.add(frame, shown, frame.film_offset(frame.sample), 1.0))
         frame.count(self, "points", count)
         if frame.is_first and asked > 1 and film_points.by_costs(frame):
-            frame.chose(self, "points", film_points.costs(frame).why(asked))
+            frame.account.chose(self, "points", film_points.costs(frame).why(asked))
         if count > 1:
             yield
             yield from self._between(frame, count)
@@ -215,7 +215,7 @@ class Film(Technique):
             _clear(frame, tuple(f"radiance.{path}" for path in paths))
         repeated_light.forget(frame)
         for path in (*self._apart, *self._pixel_paths):
-            frame.shown[f"radiance.{path}"] = f"film.{path}"
+            frame.held.shown[f"radiance.{path}"] = f"film.{path}"
 
     def show(self, frame: Frame) -> None:
         if frame.plan.last_writer(COMBINED) is self:
@@ -224,7 +224,7 @@ class Film(Technique):
     def _first_seen(self, frame: Frame) -> None:
         """What passes ask for of the surfaces in the first sample, as Cycles has it: depth, positions and indices."""
         film, mode, whole = frame.snapshot.film, data_mode(frame), frame.settings.schedule.has_passes
-        anew = whole and mode != STOCHASTIC and (film.position or frame.is_apart("film.depth"))
+        anew = whole and mode != STOCHASTIC and (film.position or frame.held.is_apart("film.depth"))
         position = frame.images["surface.position"]
         with ExitStack() as stack:
             drawn = depth = None

@@ -142,7 +142,7 @@ class LightProbes(Technique):
             blocks={"film_view": frame.view_block},
             constants={**rays["constants"], "columns": columns, "rows": rows, "probes": grid},
         )
-        return frame.read_later(image)
+        return frame.readback.later(image)
 
     def _guide(self, frame: Frame, drawn: Reading) -> np.ndarray:
         """Guide directions of the world; what each probe sees of it, as in LightRates.world_seen."""
@@ -251,7 +251,7 @@ class LightProbes(Technique):
                 },
                 constants={**rays["constants"], "probes": SPREAD_PROBES, "points": points},
             )
-            out.append(frame.read_later(image))
+            out.append(frame.readback.later(image))
         return out
 
     def release(self) -> None:

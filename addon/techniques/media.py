@@ -62,7 +62,7 @@ class MediaAttenuation(Technique):
             frame.provide(AroundEye(tuple(around.tolist())))
         if self.media.found:
             frame.provide(MediaService(self.media))
-        frame.counters.setdefault(self.name, {}).update(media=len(self.media.found), cells=self.media.cells)
+        frame.account.note(self, {"media": len(self.media.found), "cells": self.media.cells})
 
     def release(self) -> None:
         self.media.release()

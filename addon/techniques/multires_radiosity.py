@@ -261,7 +261,7 @@ class MultiresRadiosity(InstantRadiosity):
                 held += listed.values()
                 yield from self._gather_listed(frame, bindings, bound, grid, atlas, listed)
                 if frame.is_first:
-                    frame.count_texel(self, "regions", listed["entry_count"])
+                    frame.account.count_texel(self, "regions", listed["entry_count"])
             else:
                 yield from self._gather_levels(frame, bindings, bound, grid, atlas, flags)
                 if levels == 0 and frame.is_first:

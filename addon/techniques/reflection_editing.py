@@ -179,7 +179,7 @@ class ReflectionEditing(Technique):
     def sample(self, frame: Frame) -> None:
         self._edit(frame, {name: frame.images[f"surface.{name}"] for name in SURFACE_IMAGES}, EDIT)
         folded = max((one.largest for one in self._edited), default=0.0)
-        frame.counters.setdefault(self.name, {})["largest angle, degrees"] = round(folded)
+        frame.account.note(self, {"largest angle, degrees": round(folded)})
         frame.count(self, "passes", len(self._edited))
 
     def _at_film_point(self, frame: Frame, surfaces: images.Target) -> None:

@@ -102,7 +102,9 @@ class ScreenSpacePhotons(Technique):
         if self._casters is not None:
             self._photons.begin(frame, self._casters)
             if self._casters.spreads:
-                frame.chose(self, "photons", f"{SPREAD_SIDE} x {SPREAD_SIDE}, because nothing makes light converge")
+                frame.account.chose(
+                    self, "photons", f"{SPREAD_SIDE} x {SPREAD_SIDE}, because nothing makes light converge"
+                )
             at_once = self._photons.all_at_once(frame, self._casters)
             self._turns.begin(frame, ("radiance.diffuse_indirect",), at_once)
 

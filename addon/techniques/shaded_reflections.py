@@ -251,7 +251,9 @@ class ShadedReflections(Technique, BothWays):
             graphs = [frame.snapshot.materials[slot].graph for slot in frame.snapshot.used_materials]
             self._onward = any(may_refract(one) or least_roughness(one) <= ONWARD_ROUGHNESS for one in graphs)
             if not self._onward:
-                frame.chose(self, "rays", f"1 bounce, because no material is smoother than {ONWARD_ROUGHNESS:g}")
+                frame.account.chose(
+                    self, "rays", f"1 bounce, because no material is smoother than {ONWARD_ROUGHNESS:g}"
+                )
         self._guides = tuple(name for name in (SHOWN, SHOWN_THROUGH) if name in frame.images)
         guide = self._guides if frame.settings.samples > 1 else ()
         for turns in (self._turns, self._mirror_turns):

@@ -63,7 +63,7 @@ class ShaderAovs(Technique):
             held.setdefault(image, []).append((aov.name, NOTHING if nothing else aov.kind))
         self._images = {image: kinds for image, kinds in held.items() if any(kind != NOTHING for _, kind in kinds)}
         for image, held in self._images.items():
-            frame.add_write(Write(image, "RGBA32F", f"AOVs: {', '.join(name or 'UV' for name, _ in held)}", True))
+            frame.held.add(Write(image, "RGBA32F", f"AOVs: {', '.join(name or 'UV' for name, _ in held)}", True))
         self._motion = images.upload_list(_motion_rows(frame)) if motion is not None else None
         frame.provide(SurfaceValues(self._draw))
 

@@ -167,7 +167,7 @@ class ShadowsByLight(PointMaps):
         if not views:
             return False
         found = self._compared(frame, extent, views)
-        frame.chose(self, emitter.light.name, found.why)
+        frame.account.chose(self, emitter.light.name, found.why)
         if found.by_edges:
             self._edges.serve(emitter, extent)
         return found.by_edges

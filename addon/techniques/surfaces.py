@@ -147,7 +147,7 @@ class Surfaces(Technique):
                     blocks={"film_view": frame.view_block},
                     constants={"tile": TILE},
                 )
-                bounds.append([frame.read_later(image) for image in target.colors])
+                bounds.append([frame.readback.later(image) for image in target.colors])
 
         def found() -> Receivers:
             low = np.min([low.pixels() for low, _ in bounds], axis=0)

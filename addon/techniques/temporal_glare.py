@@ -104,14 +104,14 @@ class TemporalGlare(Technique):
         return scatter.MEASURE, scatter.BLOCKS  # what else there is may never be needed
 
     def show(self, frame: Frame) -> None:
-        now = (frame.samples_done, frame.shown_with)
+        now = (frame.samples_done, frame.plan.shown_with(frame.snapshot, frame.settings))
         if self._shown_for() is not frame or self._shown != now:
             self._reason = self._show(frame)
             self._shown_for, self._shown = weakref.ref(frame), now
         if self._reason is None:
             frame.picture = LENS
         else:
-            frame.leave(self, self._reason)
+            frame.account.leave(self, self._reason)
             service = frame.service(PointSpread)
             if service is not None:
                 service.leave(frame)

@@ -117,7 +117,7 @@ class TracedGlossy(Technique):
         world = frame.snapshot.world
         hierarchy = frame.hierarchy()
         emissive = frame.service(EmissivePoints) or EmissivePoints()
-        frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
+        frame.account.note(self, {"triangles": hierarchy.triangles})
         bindings = {
             "textures": {
                 "energy_table": frame.materials.energy_table,

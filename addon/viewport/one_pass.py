@@ -26,12 +26,12 @@ def draw(frame: Frame, shown: RenderPass, target: images.Target) -> None:
         target.clear((0.0, 0.0, 0.0, 1.0))
         return
     divided = bool(color) and color[0] in frame.images
-    source = frame.to_show(name)
+    source = frame.held.to_show(name)
     exposure = frame.snapshot.film.exposure if name.startswith("radiance.") else 1.0
     passes.fullscreen(
         ONE_PASS,
         target,
-        textures={"source": source, "albedo": frame.to_show(color[0]) if divided else source},
+        textures={"source": source, "albedo": frame.held.to_show(color[0]) if divided else source},
         constants={
             "scale": exposure * _scale(frame, name), "albedo_scale": _scale(frame, color[0]) if divided else 1.0,
             "channel": shown.first if len(shown.channels) == 1 else -1, "divided": int(divided),
@@ -41,4 +41,4 @@ def draw(frame: Frame, shown: RenderPass, target: images.Target) -> None:
 
 def _scale(frame: Frame, name: str) -> float:
     """What an image's values are multiplied by for their mean over the samples."""
-    return 1.0 / max(frame.samples_done, 1) if name in frame.sums else 1.0
+    return 1.0 / max(frame.samples_done, 1) if name in frame.held.sums else 1.0

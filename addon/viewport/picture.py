@@ -94,7 +94,7 @@ class Viewport:
         self._beginning: Beginning | None = None
         self._target: images.Target | None = None  # the picture, apart from the frame's images, which come and go
         self._refined: images.Image | None = None  # a draft with the shapes of its guide
-        self._shown_with: tuple = ()  # what the picture was shown with, see Frame.shown_with
+        self._shown_with: tuple = ()  # what the picture was shown with, see Plan.shown_with
         self._shown_place: tuple = ()  # from where, and in which pixels
         self._begun_for: tuple = ()  # the same of the frame
         self._look_of: tuple = ()  # of what the first look is
@@ -189,7 +189,7 @@ class Viewport:
             frame, started = self.frame, clock()
             if self._target is None and self._sample is None and frame.samples_done:
                 self._resolve(frame)  # the frame outlived an error that took its picture
-            elif self._sample is None and frame.samples_done and frame.shown_with != self._shown_with:
+            elif self._sample is None and frame.samples_done and self._is_shown_otherwise(frame):
                 self._resolve(frame)  # the same samples, at another time or with other settings of a `show` stage
             budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
             spent = self._draw_samples(frame, settings, clock, called, known, budget)
@@ -246,6 +246,9 @@ class Viewport:
                 self.pace.learn(self.scale, self._sample_seconds)
         return spent
 
+    def _is_shown_otherwise(self, frame: Frame) -> bool:
+        return frame.plan.shown_with(frame.snapshot, frame.settings) != self._shown_with
+
     def _resolve(self, frame: Frame) -> None:
         """Take the mean of the frame's samples for the picture."""
         if self._target is None or self._target.size != frame.size:
@@ -255,7 +258,7 @@ class Viewport:
             passes.copy(self.renderer.show(frame), self._target)
         else:
             one_pass.draw(frame, self.render_pass, self._target)
-        self._shown_with, self.looks = frame.shown_with, False
+        self._shown_with, self.looks = frame.plan.shown_with(frame.snapshot, frame.settings), False
         self.was_whole |= self.scale == 1
         self._refined = self._with_shapes(frame) if self.scale > 1 else None
         film = frame.snapshot.film

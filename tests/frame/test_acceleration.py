@@ -75,7 +75,7 @@ def seen_by(snapshot):
     return SimpleNamespace(
         snapshot=snapshot, geometry=SimpleNamespace(origin=np.zeros(3)), settings=Settings().as_draft(),
         measured_materials=[compile_material(one.name, one.graph) for one in snapshot.materials],
-        opacity_maps=OpacityMaps(), emission_maps=EmissionMaps(), blocker_sets=(),
+        opacity_maps=OpacityMaps(), emission_maps=EmissionMaps(),
     )  # fmt: skip
 
 

@@ -56,7 +56,7 @@ def found_bits(stage, samples=1, points=64):
     counts = images.read(own.tiles._kept["count"])[..., 0].reshape(-1)[valid]
     emitter = frame.emitters[0]
     numbers = range((samples - 1) * points, samples * points)
-    samples_of = [emitter.sample(*frame.random_volume_at(k, "light")) for k in numbers]
+    samples_of = [emitter.sample(*frame.random_volume("light", k)) for k in numbers]
     return receivers[valid, :3].astype(float), bits, counts, emitter, samples_of, own._casters
 
 

@@ -43,7 +43,7 @@ def frame_of(gpu_context):
             view_block=Block(VIEW, **values), count=lambda *counter: None,
         )  # fmt: skip
         frame.target = lambda name: images.Target((frame.images[name],))
-        frame.to_show = lambda name: frame.images[name]
+        frame.held = SimpleNamespace(to_show=lambda name: frame.images[name])
         return frame
 
     return frame_of
