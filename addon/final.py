@@ -360,8 +360,10 @@ def _noisy(frame: Frame, combined: np.ndarray) -> np.ndarray:
     """(H, W, 4) the picture without what Denoise has made of its light."""
     noisy = combined.copy()
     for path in LIGHT_PATHS:
-        if path.image in frame.shown and path.image != frame.shown[path.image]:
-            own, shown = (images.read(one) for one in (frame.images[f"film.{path.name}"], frame.to_show(path.image)))
+        if path.image in frame.held.shown and path.image != frame.held.shown[path.image]:
+            own, shown = (
+                images.read(one) for one in (frame.images[f"film.{path.name}"], frame.held.to_show(path.image))
+            )
             change = np.nan_to_num(own[..., :3] - shown[..., :3], posinf=0.0, neginf=0.0)
             noisy[..., :3] += frame.snapshot.film.exposure / max(frame.samples_done, 1) * change
     return noisy

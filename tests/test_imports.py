@@ -1,6 +1,7 @@
 """Who may import whom. The table is the law; the tests read every import under addon/ and compare."""
 
 import ast
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -206,3 +207,24 @@ def test_scene_asks_a_frame_for_its_scene_alone():
                 read = {one.attr for one in ast.walk(made) if isinstance(one, ast.Attribute)
                         and isinstance(one.value, ast.Name) and one.value.id == "frame"}  # fmt: skip
                 assert read <= known, f"{path.name}: {made.name} reads {read - known} of a frame"
+
+
+def test_what_is_asked_of_a_frame_is_there():
+    """Everywhere, of what is called `frame` or `….frame`, and of its parts that hold images and tell of techniques."""
+    parts = {"": "picture.Frame", "held": "held.Held", "account": "account.Account", "settings": "settings.Settings",
+             "settings.schedule": "schedule.Schedule"}  # fmt: skip
+    known = {part: _members(*name.split(".")) for part, name in parts.items()}
+    asked = re.compile(r"(?:\bself\.|(?<![.\w]))frame\.(?:(held|account|settings\.schedule|settings)\.)?([a-z_]+)\b")
+    for path in sorted(ADDON.rglob("*.py")):
+        if path.parts[-2] not in ("ui", "grass", "cli", "snapshot"):  # where frames are Blender's
+            text = re.sub(r"addon\.frame\.|\"frame\.", "", path.read_text(encoding="utf-8"))
+            lost = {found[0] for found in asked.finditer(text) if found[2] not in known[found[1] or ""]}
+            assert not lost, f"{path.relative_to(ADDON)} asks a frame for {lost}"
+
+
+def _members(module: str, name: str) -> set[str]:
+    """Names that a class of frame/ declares, or sets on itself."""
+    tree = ast.parse((ADDON / "frame" / f"{module}.py").read_text(encoding="utf-8"))
+    (made,) = (one for one in tree.body if isinstance(one, ast.ClassDef) and one.name == name)
+    declared = {getattr(one, "name", None) or getattr(getattr(one, "target", None), "id", "") for one in made.body}
+    return declared | set(re.findall(r"\bself\.(\w+)", ast.unparse(made)))

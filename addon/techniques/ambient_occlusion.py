@@ -50,7 +50,7 @@ class AmbientOcclusion(Technique):
 
     def begin(self, frame: Frame) -> None:
         self._number = 0
-        frame.add_write(Write(OPEN, "RGBA32F", "How open what is seen is to what lies around", True))
+        frame.held.add(Write(OPEN, "RGBA32F", "How open what is seen is to what lies around", True))
         if frame.hierarchy("shadow") is None:
             text = "it is 1 everywhere: the scene has more triangles than rays can be cast among."
             frame.ledger.notes = (*frame.ledger.notes, Note("Ambient Occlusion pass", text))
