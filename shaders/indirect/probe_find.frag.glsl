@@ -4,11 +4,13 @@
 //
 // Those that show glass stand for what is straight behind it, and those that show metal for what is mirrored there: a
 // virtual light sends to all sides what its probe saw of it, and of two mirrors one sees highlights of lamps in the other
-// that nothing else sees.
+// that nothing else sees. One in MOVED stands where a ray from it meets the next surface: there pixels look for light by
+// rays, and of a picture that shows one wall alone nothing else would find what that wall sends to the next.
 #include "indirect/path.glsl"
 #include "indirect/probe_cell.glsl"
 
 #define MOST_MIRRORS 4  // one behind another, that a probe looks at
+#define MOVED 8u
 #define WIDE_LOBE 0.55  // roughness from which a lobe sends its light about as far around as a virtual light does
 
 struct Probe {
@@ -142,6 +144,19 @@ void main()
       }
       onward = reflect(onward, probe.normal);
       probe.receives = step + 1 < MOST_MIRRORS;
+    }
+  }
+  else if (probe.receives && id % MOVED == 0u) {
+    uvec3 roll = hash3(uvec3(id, uint(film_view.sample_index), uint(film_view.seed) + 5u));
+    vec3 onward = cosine_direction(probe.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    vec3 origin = ray_origin(probe.position, probe.geometric_normal);
+    ivec2 hit;
+    float t = (dot(onward, probe.geometric_normal) > 0.0) ? trace_nearest(origin, onward, 1e29, roll.z, hit) : 1e29;
+    if (t < 1e29) {
+      probe.position = origin + t * onward;
+      probe.normal = triangle_normal(hit);
+      probe.normal *= (dot(probe.normal, onward) > 0.0) ? -1.0 : 1.0;
+      probe.geometric_normal = probe.normal;
     }
   }
   if (probe.receives) {
