@@ -102,6 +102,6 @@ def test_pairs_beside_cycles(stage, names, monkeypatch):
 
 @pytest.mark.slow
 def test_a_picture_of_one_wall_has_the_light_of_its_corners(stage):
-    """Probes stand on what is seen, here one wall, and see nothing of what it sends to the floor before it: .984 without
-    some that stand on the floor."""
+    """Probes stand on what is seen, here one wall, and see nothing of what it sends to the floor: .984 without
+    some of them on the floor."""
     assert pairs.measure(stage, ("orthographic",), [16])["16"]["ratio"] == pytest.approx(1.0, abs=0.01)
