@@ -29,6 +29,7 @@ HEAD = (
     "step",
     "first picture, s",
     "its light, s",
+    "with indirect light, s",
     "at rest, s",
     "longest block, s",
     "its draw, s",
@@ -66,6 +67,11 @@ def measured(scene: Path, backend: str, steps: list[str], package: Path, folder:
         blender(empty, folder / "install.log", *install)
         shown = ("--gpu-backend", backend, "--window-geometry", "0", "0", "1280", "800", scene)
         blender(empty, folder / "blender.log", *shown, "--python", script, "--", *steps, folder)
+        if not any(Path(empty["BLENDER_USER_RESOURCES"]).iterdir()):
+            raise RuntimeError(
+                "The caches were not empty: $REAL_BLENDER starts a Blender that sees nothing of the environment. "
+                f"Let that command pass on {', '.join(empty)}."
+            )
     return json.loads((folder / "result.json").read_text())
 
 
@@ -76,6 +82,7 @@ def rows_of(scene: str, backend: str, found: dict) -> list[tuple[str, ...]]:
     return [
         (
             scene, backend, step, told(one["first_s"]) if step == "rendered" else "", told(one["lit_s"]),
+            told(one.get("whole_s")),
             told(one["rest_s"]), f"{one['longest_s']:.2f}", f"{one['longest_draw_s']:.2f}",
             f"{one.get('dearest_s', 0.0):.2f}", one["longest_at"],
         )

@@ -47,7 +47,7 @@ class Renderer:
         self.materials = MaterialSet()
         self.displacement = Displacement()
         self.frame: Frame | None = None
-        self.waits: Callable[[Snapshot, Settings], int | None] = _for_nothing
+        self.agrees: Callable[[Snapshot, Settings], Settings | int] = _as_asked
         self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
         self._glow = EmissionMaps()
@@ -56,6 +56,7 @@ class Renderer:
         self._keys: dict[str, object] = {}
         self._lasting: dict[type, object] = {}  # what frames share, by class
         self._frame_key: object = None
+        self._untouched = False  # what is begun waits, and the frame before is still whole
         self._light: object = None  # what gives the frame's light, see frame/history.py
         self._view_block: Block | None = None
         context.on_release(self.release)
@@ -78,14 +79,16 @@ class Renderer:
         self, snapshot: Snapshot, settings: Settings, numbers: tuple[int, ...] | None = None
     ) -> Generator[tuple[int, int], None, Frame]:
         """The same in parts: yields (0, 0) when geometry and materials are those of the snapshot, then (done, total)
-        after each program that had to be compiled; returns the frame. While `waits` tells a number of programs that
-        somebody else compiles, it goes no further and yields (0, that number)."""
+        after each program that had to be compiled; returns the frame. While `agrees` tells a number of programs that
+        somebody else compiles, it goes no further and yields (0, that number); then it begins with the settings that
+        `agrees` tells."""
         try:
             frame = yield from self._begin(snapshot, settings)
             frame.numbers = numbers
             return frame
         except BaseException:
-            self._frame_key = None  # what is half made, or made of half of a change, is not to be taken for it
+            if not self._untouched:  # what is half made, or made of half of a change, is not to be taken for it
+                self._frame_key = None
             raise
 
     def _begin(self, snapshot: Snapshot, settings: Settings) -> Generator[tuple[int, int], None, Frame]:
@@ -93,7 +96,7 @@ class Renderer:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
         if settings.samples_to_draw < 1:
             raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
-        watch, given = Stopwatch(), snapshot
+        watch, given, self._untouched = Stopwatch(), snapshot, False
         context.ensure()
         context.begin_picture()
         device_probe.ensure(measures=False)
@@ -105,9 +108,13 @@ class Renderer:
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
         yield 0, 0
-        while (left := self.waits(given, settings)) is not None:
-            yield 0, left
-        device_probe.ensure()
+        while isinstance(agreed := self.agrees(given, settings), int):
+            self._untouched = not geometry_changed  # nothing else has been changed yet that the key does not hold
+            yield 0, agreed
+        self._untouched = False
+        # Measuring takes a second: a picture that is shown until another process has compiled does without.
+        device_probe.ensure(measures=agreed is settings)
+        settings = agreed
         environment = self._update_environment(snapshot)
         self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
         plan = make_plan(self.techniques, snapshot, settings)
@@ -421,8 +428,9 @@ def _row(frame: Frame, technique: Technique, spent: dict[str, float]) -> Row:
     return frame.account.row(technique, ", ".join(frame.plan.slots_of(technique)), spent[technique.name])
 
 
-def _for_nothing(_snapshot: Snapshot, _settings: Settings) -> None:
-    """As `Renderer.waits`: begin at once."""
+def _as_asked(_snapshot: Snapshot, settings: Settings) -> Settings:
+    """As `Renderer.agrees`: begin at once."""
+    return settings
 
 
 def _stage(frame: Frame, stage: str) -> Iterator[None]:

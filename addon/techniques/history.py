@@ -115,7 +115,8 @@ class History(Technique):
             return "other machines, or other runs, would have another past"
         return "motion blur looks at several moments" if snapshot.motion is not None else None
 
-    def sample(self, frame: Frame) -> Iterator[None] | None:
+    def sample(self, frame: Frame) -> Iterator[None]:
+        """Cut into parts between its programs, so that a viewport answers while they are compiled."""
         if not frame.is_first:
             return
         before = frame.before
@@ -134,8 +135,9 @@ class History(Technique):
                 blocks={"film_view": frame.view_block},
                 constants={"most_still": float(MANY), "most_moved": float(FEW)},
             )  # fmt: skip
+            yield
             if frame.settings.samples == 1 or frame.settings.schedule.is_draft:
-                self._filtered(frame, indirect)
+                yield from self._filtered(frame, indirect)
             for path, found in zip(PATHS, (direct, indirect)):
                 passes.copy(found.colors[0], frame.target(path))
         frame.count(self, "passes", 3)
@@ -143,11 +145,12 @@ class History(Technique):
             frame.count(self, "pictures before", before.turn)
             frame.count(self, "moved objects", len(before.moved))
 
-    def _filtered(self, frame: Frame, shown: images.Target) -> None:
+    def _filtered(self, frame: Frame, shown: images.Target) -> Iterator[None]:
         """Indirect light of neighbours where few pictures stand behind it."""
         light, surfaces = frame.images["history.indirect"], surface_bindings(frame)
         with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
             neighbours.means(frame, light, near, far)
+            yield
             textures = {
                 "surface_diffuse": surfaces["surface_diffuse"], "fresh_indirect": frame.images[PATHS[1]],
                 "before_facing": frame.images["history.facing"], "before_indirect": light,

@@ -34,6 +34,7 @@ from ..frame import device_probe
 from ..frame.run import Renderer
 from ..frame.settings import Settings
 from ..gfx import device
+from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.user_folder import user_folder
 from ..materials.graph import Graph
@@ -78,15 +79,19 @@ class Ahead:
         self._came = False
         self._known: set[str] | None = None
 
-    def left(self, renderer: Renderer, whole: Snapshot, settings: Settings, draft: bool) -> int | None:
+    def left(
+        self, renderer: Renderer, whole: Snapshot, settings: Settings, draft: bool, edit: bool = False
+    ) -> int | None:
         """How many programs the other process has to compile before this picture is begun, at least 1; None: begin.
-        `whole`: the scene on a film in full resolution; `settings`: those of the picture in full."""
+        `whole`: the scene on a film in full resolution; `settings`: those of the picture in full. Of an `edit` the
+        programs of single materials do not count: they are few and small, and edits of node trees are many."""
         if self.failed or gpu.platform.backend_type_get() not in BACKENDS:
             return None
         stage = DRAFT if draft else FULL
-        needs = frozenset(_digest(one) for one in needs_of(renderer, whole, settings))
+        digests = [_digest(one) for one in needs_of(renderer, whole, settings)]
+        needs, asked = frozenset(digests), digests[-1:] if edit else digests
         self._hear()
-        if {f"{one} {stage}" for one in needs} <= self._remembered():
+        if {f"{one} {stage}" for one in asked} <= self._remembered():
             return None
         job, now = self._job, time.monotonic()
         if job is not None and job.needs == needs:
@@ -239,7 +244,7 @@ def _receive(process: subprocess.Popen, lines: deque[str]) -> None:
 
 def needs_of(renderer: Renderer, snapshot: Snapshot, settings: Settings) -> list[tuple]:
     """What decides which programs a picture uses, but for whether it is a draft: its materials, one by one, and all
-    else together."""
+    else together, last. Kinds of lamps do where programs hold only those of the scene."""
     compiled = renderer.materials.compiled
     shown = {draw.material for draw in renderer.geometry.draws if not compiled[draw.material].bounds_alone}
     materials = [_text_of(renderer.materials.surface_program(k)) for k in shown]
@@ -258,10 +263,11 @@ def needs_of(renderer: Renderer, snapshot: Snapshot, settings: Settings) -> list
         )
         for one in snapshot.lights
     }
+    of_lamps = to_hold(sorted(map(repr, lamps)), bool(lamps))
     world, camera, film = snapshot.world, snapshot.camera, snapshot.film
     trees = sorted(_types_in(one.graph) for one in (world, *snapshot.lights) if one.graph is not None)
     features = (
-        sorted(map(repr, of_materials)), shines, sorted(map(repr, lamps)), trees, world.image is None, any(world.color),
+        sorted(map(repr, of_materials)), shines, of_lamps, trees, world.image is None, any(world.color),
         has_media(snapshot), camera.panorama is None, camera.aperture is None, camera.kind, film.transparent,
         any(one.links is not NO_LINKS for one in snapshot.instances),
         any(one.caustics_caster for one in snapshot.instances),

@@ -17,7 +17,7 @@ from .. import techniques
 from ..frame.bands import Bands
 from ..frame.picture import Frame
 from ..frame.run import Renderer
-from ..frame.settings import Settings
+from ..frame.settings import OFF, Settings
 from ..frame.within_sample import WithinSample
 from ..gfx import device, images, library, passes
 from ..scene.view import View
@@ -37,7 +37,8 @@ REST_S = 0.25  # without a change for so long, or for two redraws, the picture i
 
 MOST_LETTERS = 160  # of a warning in the region's text, for which Blender has 512 bytes
 
-CHECKS, MOVES, CLIMBS = "checks", "moves", "climbs"  # why a frame is begun
+CHECKS, MOVES, CLIMBS, LIGHTS = "checks", "moves", "climbs", "lights"  # why a frame is begun
+AT_REST = (CLIMBS, LIGHTS)
 
 
 @dataclass
@@ -49,12 +50,15 @@ class Beginning:
     size: tuple[int, int]
     border: tuple[int, int, int, int]
     scale: int
-    why: str  # CHECKS: whether anything drawn has changed; MOVES: it has; CLIMBS: the same in finer pixels
+    # CHECKS: whether anything drawn has changed; MOVES: it has; CLIMBS: the same in finer pixels; LIGHTS: the same with
+    # indirect light, which was left out
+    why: str
     samples: int
     reading: float = 0.0  # seconds that the scene took to be read
     seconds: float = 0.0
     placed: bool = False  # geometry and materials are there
     left: int = 0  # programs that it still has to compile, as far as known
+    direct: bool = False  # as `only_direct` says: another process compiles the programs of the rest
 
 
 class Viewport:
@@ -64,6 +68,7 @@ class Viewport:
         self.renderer = Renderer(techniques.make_registry)
         self.ahead: Ahead | None = None  # who compiles programs elsewhere, before a picture is begun here
         self.held = False  # the picture waits for that
+        self.direct = False  # what is drawn lacks indirect light meanwhile, see `only_direct`
         self.was_whole = False  # a sample in full resolution has been shown
         self.looked_after = False  # a timer looks when that has come
         self.cache = SnapshotCache()
@@ -131,13 +136,14 @@ class Viewport:
         if self.paused and self.frame is not None:
             return f"Paused after sample {self.frame.samples_done} of {self.frame.settings.samples}"
         if self.held and self.ahead is not None:
-            return self.ahead.doing
+            return self.ahead.doing + (", direct light only meanwhile" if self.direct else "")
         if self._beginning is not None:
             left = self._beginning.left
             return f"Compiling shaders ({left} remaining)" if left else "Reading the scene"
         if self.frame is None:
             return "Waiting for the GPU"
         coarse = f", 1/{self.scale} resolution" if self.scale > 1 else ""
+        coarse += ", direct light only" if self.direct else ""
         done, of = self.frame.samples_done, self.frame.settings.samples
         if done == 0 and self._compiled:
             return f"Compiling shaders for {self.frame.at} ({self._compiled} so far){coarse}"
@@ -184,14 +190,13 @@ class Viewport:
         called, known = clock(), library.news()
         border = border or (0, 0, *size)
         self._prepare(source, camera, size, border, settings, clock)
-        budget = BUDGET_S
-        while self._begun(settings, clock, called, known):
+        budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S)
+        while self._begun(settings, clock, called, known, budget):
             frame, started = self.frame, clock()
             if self._target is None and self._sample is None and frame.samples_done:
                 self._resolve(frame)  # the frame outlived an error that took its picture
             elif self._sample is None and frame.samples_done and self._is_shown_otherwise(frame):
                 self._resolve(frame)  # the same samples, at another time or with other settings of a `show` stage
-            budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
             spent = self._draw_samples(frame, settings, clock, called, known, budget)
             self.seconds += clock() - started
             if clock() - called + spent > budget or not self._climbs(camera, size, border, settings, clock):
@@ -199,7 +204,8 @@ class Viewport:
         self._show_something(camera, size, border)
         self._left_at = None if self.done else clock()
         frame = self.frame
-        whole = self._beginning is None and self.scale == 1 and frame.samples_done >= settings.samples
+        whole = self._beginning is None and self.scale == 1 and not self.direct
+        whole = whole and frame.samples_done >= settings.samples
         if whole and not self._finished:
             self._finished = True
             self.renderer.finish(frame, ())  # publishes the ledger
@@ -358,11 +364,16 @@ class Viewport:
 
     def _climbs(self, camera: Camera, size, border, settings: Settings, clock) -> bool:
         """Begin the same picture in finer pixels, if it rests; whether it does."""
-        if self.scale == 1 or self._beginning is not None or not self.frame.samples_done or self._sample is not None:
+        if self._beginning is not None or not self.frame.samples_done or self._sample is not None:
             return False
-        if clock() - self._changed_at <= max(REST_S, 2.0 * min(self._pauses)):
+        rests = clock() - self._changed_at > max(REST_S, 2.0 * min(self._pauses))
+        finer = self.pace.finer(self.scale) if self.scale > 1 else 1
+        if self.direct and (finer == 1 or not rests):
+            self._begin(LIGHTS, self.scale, camera, size, border, settings)
+            return True
+        if self.scale == 1 or not rests:
             return False
-        self._begin(CLIMBS, self.pace.finer(self.scale), camera, size, border, settings)
+        self._begin(CLIMBS, finer, camera, size, border, settings)
         return True
 
     def _begin(
@@ -376,22 +387,31 @@ class Viewport:
         )
         whole, settings = replace(self._snapshot, camera=camera, film=film), replace(settings, shows=asked)
         self.held = False
-        # An edit rarely needs many programs: they are compiled here, one a redraw, beside the picture of before.
-        if self.ahead is not None and self.was_whole:
-            self.renderer.waits = lambda *_: None
-        elif self.ahead is not None:
-            self.renderer.waits = lambda _, drawn: self._waits_for(whole, settings, drawn.schedule.is_draft)
-        drawn = drawn_with(settings, scale, scale == 1 or why == CLIMBS)
+        drawn = drawn_with(settings, scale, scale == 1 or why in AT_REST)
         parts = self.renderer.beginning(replace(whole, film=coarser(film, scale)), drawn)
-        self._beginning = Beginning(parts, camera, size, border, scale, why, settings.samples, reading)
+        begun = Beginning(parts, camera, size, border, scale, why, settings.samples, reading)
+        self.renderer.agrees = lambda _, drawn: self._agreed(begun, whole, settings, drawn)
+        self._beginning = begun
 
-    def _waits_for(self, whole: Snapshot, settings: Settings, draft: bool) -> int | None:
-        """How many programs somebody else has to compile before the picture is begun; None: none."""
-        left = self.ahead.left(self.renderer, whole, settings, draft)
-        self.held = left is not None
+    def _agreed(self, begun: Beginning, whole: Snapshot, settings: Settings, drawn: Settings) -> Settings | int:
+        """With which settings the picture is begun: those it would be `drawn` with; until another process has compiled
+        its programs without what has the largest; or how many it waits for."""
+        left = None
+        if self.ahead is not None:
+            left = self.ahead.left(self.renderer, whole, settings, drawn.schedule.is_draft, edit=self.was_whole)
+        begun.direct = self.held = False
+        if left is None:
+            return drawn
+        if begun.why == CHECKS and not drawn.schedule.is_draft and not self.direct:
+            return left  # it has changed: a draft is begun
+        climbs = begun.why == CLIMBS and drawn.schedule.is_draft
+        if begun.why in (CHECKS, MOVES) or (climbs and (self.direct or drawn.bounces == 0)):
+            begun.direct = drawn.bounces > 0
+            return only_direct(drawn) if begun.direct else drawn
+        self.held = True
         return left
 
-    def _begun(self, settings: Settings, clock, called: float, known: int) -> bool:
+    def _begun(self, settings: Settings, clock, called: float, known: int, budget: float) -> bool:
         """Go on with the frame that is begun, if there is one; whether there is time to draw it."""
         while self._beginning is not None:
             begun, before = self._beginning, clock()
@@ -409,13 +429,15 @@ class Viewport:
             begun.placed, begun.left = True, total - done
             if self.held:
                 return False
+            if self.ahead is not None and not self._look_of and self.picture is None and begun.camera.panorama is None:
+                return False  # the first look comes before all else
             if begun.why == CHECKS and total:  # no picture that stays as it is compiles anything
                 self._changed(begun, settings, clock)
-            if not device.known():  # it is measured next, which takes a second: a first look comes before
+            if not device.known() and not begun.direct:  # it is measured next, for a second: a first look comes before
                 return False
-            if library.news() != known and clock() - called > BUDGET_S:
+            if library.news() != known and clock() - called > budget:
                 return False
-        return library.news() == known or clock() - called <= BUDGET_S
+        return library.news() == known or clock() - called <= budget
 
     def _changed(self, begun: Beginning, settings: Settings, clock) -> None:
         """What is drawn has changed: begin it at a scale for that, unless that is what is begun."""
@@ -430,7 +452,7 @@ class Viewport:
 
     def _adopt(self, frame: Frame, begun: Beginning, settings: Settings, clock) -> None:
         """Take the frame that is begun for the one that is drawn."""
-        frame.shared_out = self.bands if begun.scale == 1 or begun.why == CLIMBS else None
+        frame.shared_out = self.bands if begun.scale == 1 or begun.why in AT_REST else None
         if frame is self.frame:
             if frame.samples_done < settings.samples:
                 self._finished = False
@@ -438,10 +460,11 @@ class Viewport:
         if begun.size != self._size:
             images.pool.trim()  # nobody will ask for the images of the old size again
         self.frame, self.scale, self._size = frame, begun.scale, begun.size
+        self.direct = begun.direct
         self._within = WithinSample(frame)
         self.seconds, self._finished, self._sample, self._compiled = 0.0, False, None, 0
         self._begun_s, self._begun_for = begun.seconds, (_view_key(begun.camera), begun.size, begun.border)
-        self._waits = begun.why == CLIMBS
+        self._waits = begun.why in AT_REST
         if begun.why == CHECKS:
             self._changed(begun, settings, clock)
 
@@ -468,6 +491,11 @@ def drawn_with(settings: Settings, scale: int, waits: bool) -> Settings:
     is drawn as one, whose passes need not wait for each other."""
     drawn = replace(settings, profile=waits)
     return drawn.as_draft() if scale > 1 else drawn
+
+
+def only_direct(settings: Settings) -> Settings:
+    """The same without indirect light and what glass lets through, which have the largest programs."""
+    return replace(settings, bounces=0, slots={**settings.slots, "transmission": OFF})
 
 
 def _view_key(camera: Camera) -> tuple:

@@ -22,7 +22,7 @@ class Slow:
     def __init__(self):
         self.ready, self.asked = set(), []
 
-    def left(self, renderer, whole, settings, draft):
+    def left(self, renderer, whole, settings, draft, edit=False):
         self.asked.append((whole.film.width, whole.film.height, settings.schedule.is_draft))
         return None if (DRAFT if draft else FULL) in self.ready else 5
 
@@ -33,36 +33,84 @@ def own_folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_view_shows_a_first_look_then_a_draft_then_all_as_the_other_process_gets_ready(region):
-    region.viewport.ahead = slow = Slow()
+def test_view_shows_a_first_look_then_direct_light_then_all_as_the_other_process_gets_ready(region):
+    viewport = region.viewport
+    viewport.ahead = slow = Slow()
     region.draw()
-    assert region.viewport.held and region.viewport.looks and region.viewport.picture is not None
-    assert region.viewport.status() == slow.doing
+    assert viewport.looks and viewport.picture is not None and viewport.frame is None  # nothing else in the same redraw
     region.draw(region.moved(0.1))  # the first look follows the view
-    assert region.viewport.held and region.viewport.looks and not region.viewport.done
-    slow.ready.add(DRAFT)
-    region.clock.now += 1.0
-    region.draw()
     for _ in range(20):
         region.clock.now += 1.0
         region.draw()
-    assert not region.viewport.looks and region.viewport.scale > 1 and region.viewport.held
+    assert viewport.held and viewport.direct and not viewport.looks and not viewport.done
+    assert viewport.scale > 1 and viewport.frame.settings.bounces == 0
+    assert viewport.status() == f"{slow.doing}, direct light only meanwhile"
+    region.draw(region.moved(0.1))  # so does the picture without indirect light
+    assert viewport.direct and viewport.frame.settings.bounces == 0
+    slow.ready.add(DRAFT)
+    for _ in range(20):
+        region.clock.now += 1.0
+        region.draw()
+    assert viewport.held and not viewport.direct and viewport.scale > 1 and viewport.frame.settings.bounces > 0
     slow.ready.add(FULL)
     held = region.rest()
-    assert slow.asked[-1][:2] == region.viewport.frame.size and not slow.asked[-1][2]
+    assert slow.asked[-1][:2] == viewport.frame.size and not slow.asked[-1][2]
     free = Region()
     assert np.array_equal(held, free.rest())
     free.viewport.release()
 
 
-def test_an_edit_does_not_wait_for_another_process(region):
-    """Its programs are few: compiled here they are there sooner than a second Blender has read the scene."""
+def test_an_update_that_changes_nothing_leaves_direct_light_as_it_is(region):
+    region.viewport.ahead = Slow()
+    for _ in range(20):
+        region.clock.now += 1.0
+        region.draw()
+    frame = region.viewport.frame
+    region.viewport.dirty = True
+    for _ in range(10):
+        region.clock.now += 1.0
+        region.draw()
+    assert region.viewport.frame is frame and region.viewport.held and region.viewport.direct
+
+
+def test_without_bounces_nothing_is_left_out(region, scene):
+    scene.candela.bounces = 0
+    region.viewport.ahead = slow = Slow()
+    for _ in range(20):
+        region.clock.now += 1.0
+        region.draw()
+    assert region.viewport.held and not region.viewport.direct
+    slow.ready.add(FULL)
+    region.rest()
+
+
+def test_an_edit_that_needs_other_programs_shows_its_direct_light_first(region):
     region.rest()
     region.viewport.ahead = other = Slow()
     bpy.context.scene.objects["Point"].data.type = "SUN"
     region.viewport.dirty = True
+    for _ in range(20):
+        region.clock.now += 1.0
+        region.draw()
+    assert region.viewport.held and region.viewport.direct and not region.viewport.looks
+    other.ready |= {DRAFT, FULL}
+    edited = region.rest()
+    free = Region()
+    assert np.array_equal(edited, free.rest())
+    free.viewport.release()
+
+
+def test_an_edit_of_a_material_alone_does_not_wait_for_another_process(region, own_folder, monkeypatch):
+    """Its own programs are few and small: compiled here they are there sooner than a second Blender has read it."""
+    monkeypatch.setattr(Ahead, "_start", lambda self: None)
+    monkeypatch.setattr(ahead, "_send", lambda *_: None)
     region.rest()
-    assert not other.asked and not region.viewport.held
+    viewport, other = region.viewport, Ahead()
+    seen, settings = viewport.frame.snapshot, viewport.frame.settings
+    *_, features = needs_of(viewport.renderer, seen, settings)
+    other._remember({f"{ahead._digest(features)} {stage}" for stage in (DRAFT, FULL)})
+    assert other.left(viewport.renderer, seen, settings, True, edit=True) is None
+    assert other.left(viewport.renderer, seen, settings, True) is not None
 
 
 def needs(region):
@@ -86,8 +134,6 @@ def test_what_needs_programs_is_told_from_what_does_not(region):
 def test_another_process_draws_and_is_remembered(region, own_folder):
     region.viewport.ahead = other = Ahead()
     said, ended = set(), time.monotonic() + 300.0
-    region.draw()
-    assert region.viewport.held
     while not region.viewport.done and time.monotonic() < ended:
         time.sleep(0.05)
         region.clock.now += 1.0
@@ -127,10 +173,10 @@ def test_process_that_ends_is_done_without(region, own_folder, monkeypatch):
     nothing = (sys.executable, "-c", "")
     monkeypatch.setattr(ahead.subprocess, "Popen", lambda command, **options: started(nothing, **options))
     region.viewport.ahead = other = Ahead()
-    region.draw()
     ended = time.monotonic() + 30.0
-    while region.viewport.held and time.monotonic() < ended:
+    while not other.failed and time.monotonic() < ended:
         time.sleep(0.02)
+        region.clock.now += 1.0
         region.draw()
     assert other.failed and not region.viewport.held
     region.rest()

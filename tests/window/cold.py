@@ -64,7 +64,7 @@ def until_rest(name, change):
     old = watched.frame if watched else None
     change()
     watch.look()
-    first = lit = None
+    first = lit = whole = None
     while watch.seconds < TIMEOUT_S:
         yield PAUSE_S
         watch.look()
@@ -83,9 +83,11 @@ def until_rest(name, change):
                 time.monotonic(),
                 time.process_time(),
             )  # the picture of the window takes its time
+        if whole is None and lit is not None and not one.direct and anew and not one.looks:
+            whole = watch.seconds  # with its indirect light
         if lit is not None and one.done and not one.dirty:
             break
-    result[name] = {"first_s": first, "lit_s": lit, "rest_s": watch.seconds, **watch.end()}
+    result[name] = {"first_s": first, "lit_s": lit, "whole_s": whole, "rest_s": watch.seconds, **watch.end()}
     picture(f"{name}.png")
     yield 0.2
 
