@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
+from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Note, Snapshot
@@ -27,9 +28,22 @@ BRINGS = {
 NO_GRASS = ("no material", "it is not in the pass tree")  # how reasons begin that nobody need hear
 
 
-def notes_of(plan: Plan, snapshot: Snapshot, settings: Settings) -> tuple[Note, ...]:
-    """None for most scenes."""
-    return (*_for_size(plan, snapshot), *_where_systems_meet(plan, settings))
+def notes_of(
+    plan: Plan, snapshot: Snapshot, settings: Settings, materials: Sequence[CompiledMaterial]
+) -> tuple[Note, ...]:
+    """None for most scenes. `materials`: the snapshot's, compiled."""
+    tinted = (one for k, one in enumerate(materials) if one.tinted and k in snapshot.used_materials)
+    return (*_for_size(plan, snapshot), *_where_systems_meet(plan, settings), *_bounces_past(plan, tinted))
+
+
+def _bounces_past(plan: Plan, tinted: Iterable[CompiledMaterial]) -> Iterator[Note]:
+    """Rays of bounced light pass coloured layers at random, by their mean."""
+    if "indirect" in plan.filled:
+        for one in tinted:
+            text = (
+                "its coloured transparency colours light that comes straight; bounced light passes it as through grey."
+            )
+            yield Note(f"Material '{one.name}'", text, one.name)
 
 
 def _for_size(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:

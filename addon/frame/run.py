@@ -120,7 +120,8 @@ class Renderer:
         plan = make_plan(self.techniques, snapshot, settings)
         ledger.times["upload"], ledger.times["compile"] = watch.working, watch.compiling
         said = (*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes)
-        ledger.notes = tuple(dict.fromkeys((*said, *left_out.notes_of(plan, snapshot, settings))))
+        lacks = left_out.notes_of(plan, snapshot, settings, self.materials.compiled)
+        ledger.notes = tuple(dict.fromkeys((*said, *lacks)))
 
         light = self._light_key(snapshot, settings, plan)
         key = self._content_key(snapshot, settings, light)

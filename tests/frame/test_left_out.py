@@ -32,14 +32,14 @@ def test_what_is_left_out_for_the_scene_s_size_is_said(large):
         row("shaded_reflections", large), row("traced_refraction", "no material is glass", "transmission"),
         row("light_probes", large),
     )  # fmt: skip
-    (note,) = losses(left_out.notes_of(Plan((), skipped, {}), SCENE, FEW))
+    (note,) = losses(left_out.notes_of(Plan((), skipped, {}), SCENE, FEW, ()))
     assert str(note).startswith(f"Scene: {large}: bounced light, light in volumes and what mirrors and glass show")
     assert "are missing from the picture" in note.text and "copies" in note.text
 
 
 def test_a_slot_that_another_technique_fills_is_not_missing(large):
     plan = Plan((), (row("instant_radiosity", large, "indirect"),), {"indirect": "ssdo"})
-    (note,) = losses(left_out.notes_of(plan, SCENE, FEW))
+    (note,) = losses(left_out.notes_of(plan, SCENE, FEW, ()))
     assert "missing where it comes from what the camera does not see" in note.text
 
 
@@ -47,9 +47,9 @@ def test_scenes_that_can_be_traced_say_nothing(monkeypatch):
     monkeypatch.setattr(acceleration, "too_many", lambda snapshot: None)
     monkeypatch.setattr(acceleration, "too_many_copies", lambda snapshot: "many")
     skipped = row("implicit_visibility", "many", "indirect"), row("image_space_subsurface", "many", "subsurface")
-    notes = left_out.notes_of(Plan((), skipped[:1], {"indirect": "instant_radiosity"}), SCENE, FEW)
+    notes = left_out.notes_of(Plan((), skipped[:1], {"indirect": "instant_radiosity"}), SCENE, FEW, ())
     assert notes == ()
-    (note,) = left_out.notes_of(Plan((), skipped, {"indirect": "instant_radiosity"}), SCENE, FEW)
+    (note,) = left_out.notes_of(Plan((), skipped, {"indirect": "instant_radiosity"}), SCENE, FEW, ())
     assert note.text.startswith("many: light below surfaces is missing")
 
 
@@ -59,16 +59,16 @@ def test_what_mirrors_lack_of_volumes_and_grass_is_said(monkeypatch, bounces, co
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
     settings = SimpleNamespace(bounces=4, get=lambda technique, name: bounces)
     air, mirrors, grass = (SimpleNamespace(name=name) for name in ("airlight", "shaded_reflections", "grass"))
-    assert len(left_out.notes_of(Plan((air, mirrors), (), {}), SCENE, settings)) == count
-    assert len(left_out.notes_of(Plan((air, mirrors, grass), (), {}), SCENE, settings)) == count + 1
-    assert left_out.notes_of(Plan((air, grass), (), {}), SCENE, settings) == ()
+    assert len(left_out.notes_of(Plan((air, mirrors), (), {}), SCENE, settings, ())) == count
+    assert len(left_out.notes_of(Plan((air, mirrors, grass), (), {}), SCENE, settings, ())) == count + 1
+    assert left_out.notes_of(Plan((air, grass), (), {}), SCENE, settings, ()) == ()
 
 
 def test_grass_whose_patch_cannot_be_read_is_said(monkeypatch):
     for name in ("too_many", "too_many_copies"):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
     for reason, count in (("no material that is shown is covered with grass", 0), ("'a.grass' does not exist", 1)):
-        assert len(left_out.notes_of(Plan((), (row("grass", reason),), {}), SCENE, FEW)) == count
+        assert len(left_out.notes_of(Plan((), (row("grass", reason),), {}), SCENE, FEW, ())) == count
 
 
 def test_what_panoramas_lack_is_said(monkeypatch):
@@ -76,5 +76,15 @@ def test_what_panoramas_lack_is_said(monkeypatch):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
     scene = SimpleNamespace(camera=SimpleNamespace(panorama="equirectangular"))
     skipped = (row("volume_caustics", bends_lines(scene)), row("screen_space_photons", bends_lines(scene), "caustics"))
-    (note,) = losses(left_out.notes_of(Plan((), skipped, {"caustics": "caustics_mapping"}), scene, FEW))
+    (note,) = losses(left_out.notes_of(Plan((), skipped, {"caustics": "caustics_mapping"}), scene, FEW, ()))
     assert note.text == f"{bends_lines(scene)}: light of caustics in volumes is missing from the picture."
+
+
+def test_coloured_layers_that_bounced_light_passes_as_grey_are_named(monkeypatch):
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    scene = SimpleNamespace(camera=None, used_materials={0, 1})
+    materials = [SimpleNamespace(name=name, tinted=tinted) for name, tinted in (("A", False), ("B", True), ("C", True))]
+    (note,) = left_out.notes_of(Plan((), (), {"indirect": "instant_radiosity"}), scene, FEW, materials)
+    assert note.subject == "Material 'B'" and "grey" in note.text
+    assert left_out.notes_of(Plan((), (), {}), scene, FEW, materials) == ()
