@@ -34,6 +34,7 @@ from .held import Held
 from .ledger import REUSED, Ledger, Row
 from .picture import Frame
 from .plan import Plan, make_plan
+from .reads import content
 from .settings import Settings
 from .technique import Technique
 
@@ -53,7 +54,6 @@ class Renderer:
         self._glow = EmissionMaps()
         self._lamp_maps = LampMaps()
         self._environment: tuple[object, Environment] | None = None
-        self._keys: dict[str, object] = {}
         self._lasting: dict[type, object] = {}  # what frames share, by class
         self._frame_key: object = None
         self._untouched = False  # what is begun waits, and the frame before is still whole
@@ -142,7 +142,7 @@ class Renderer:
         self._frame_key = key
         before = history.usable(history.remembered(self.frame, self._light), snapshot, light)
         self._drop_frame()
-        self._light, asked = light, settings
+        self._light = light
         settings = history.seeded(settings, before)
         values = view.values(0, settings.seed, (0.0, 0.0), self.geometry.size)
         if self._view_block is None:
@@ -161,12 +161,6 @@ class Renderer:
             for write in technique.writes:
                 if not write.by_need:
                     held.take(write)
-        for technique in plan.techniques:
-            wanted = technique.key(snapshot, asked)
-            if technique.name not in self._keys or self._keys[technique.name] != wanted:
-                with frame.profiler.step(technique.name):
-                    technique.prepare(frame)
-                self._keys[technique.name] = wanted
         return frame
 
     def forget(self) -> None:
@@ -336,7 +330,6 @@ class Renderer:
         self._hierarchies.release()
         self._lamp_maps.release()
         self._environment = self._view_block = self._frame_key = None
-        self._keys.clear()
         for kept in self._lasting.values():
             if hasattr(kept, "release"):
                 kept.release()
@@ -408,11 +401,9 @@ class Renderer:
 
     @staticmethod
     def _content_key(snapshot: Snapshot, settings: Settings, light: tuple) -> tuple:
-        camera = snapshot.camera
         return (
-            light, snapshot.film,
-            camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
-            camera.panorama, settings.seed, settings.shows, settings.schedule.known_total and settings.samples,
+            light, snapshot.film, content(snapshot.camera, ("name",)), settings.seed, settings.shows,
+            settings.schedule.known_total and settings.samples,
             settings.schedule.known_total and (settings.sample_offset, settings.samples_to_draw),
             settings.schedule.known_total and (settings.time_limit, settings.noise_threshold),
             snapshot.motion and snapshot.motion.key,
@@ -461,15 +452,13 @@ def _timed(frame: Frame, parts: Iterator[None]) -> Iterator[None]:
         yield
 
 
+NO_LIGHT = ("name", "group")  # fields of a lamp that tell nothing of the light that it gives
+IN_TREES = ("random", "pass_index", "color")  # that its node tree alone may ask for
+
+
 def lights_key(snapshot: Snapshot) -> tuple:
     """Equal in two snapshots if all lamps give the same light."""
-    return tuple(
-        (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
-         light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own,
-         *(() if light.graph is None else (light.graph, light.random, light.pass_index, light.color)), light.links)
-        for light in snapshot.lights
-    )  # fmt: skip
+    return tuple(content(one, NO_LIGHT if one.graph is not None else NO_LIGHT + IN_TREES) for one in snapshot.lights)
 
 
 # What artists call images that programs read beside others (gfx/images.py, gfx/struct.py).

@@ -5,7 +5,7 @@ Techniques are registered in techniques/__init__.py.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -165,13 +165,6 @@ class Technique:
         """Sums over samples of light paths, colours and normals that it needs by themselves (Held.is_apart)."""
         return ()
 
-    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        """Equal keys in two frames mean that what `prepare` made still stands."""
-        return None
-
-    def prepare(self, frame: Frame) -> None:
-        """Work that outlives the picture. Runs when the key has changed."""
-
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         """Programs that the picture will need, to be compiled ahead; any that are missing compile when first used."""
         return ()
@@ -193,7 +186,7 @@ class Technique:
         """Whether it works on the mean of the samples alone: no sample is drawn anew where its parameters change, or
         the time."""
         mine = type(self)
-        stages = ("prepare", "begin", "sample", "end")
+        stages = ("begin", "sample", "end")
         return mine.show is not Technique.show and all(getattr(mine, s) is getattr(Technique, s) for s in stages)
 
     def release(self) -> None:

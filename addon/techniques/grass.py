@@ -37,6 +37,7 @@ import numpy as np
 
 from ..film.points import OwnPoint
 from ..frame.picture import Frame
+from ..frame.reads import Reads
 from ..frame.settings import Settings
 from ..frame.technique import MATERIAL, Param, Technique, own_value
 from ..gfx import images
@@ -162,7 +163,7 @@ class Grass(Technique):
     provides = (GrassTable,)
 
     def __init__(self):
-        self._table: tuple[object, images.Image] | None = None
+        self._table: Reads[images.Image] = Reads(lambda fields: images.upload(table_of(fields), TABLE[0]))
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         wanted = _wanted(snapshot)
@@ -176,9 +177,6 @@ class Grass(Technique):
                 why.append(str(error).rstrip("."))
         return "; ".join(dict.fromkeys(why)) if len(why) == len(wanted) else None
 
-    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        return tuple(_field_key(snapshot, snapshot.materials[material]) for material in _wanted(snapshot))
-
     def begin(self, frame: Frame) -> None:
         fields, entries = [], {}
         for material in _wanted(frame.snapshot):
@@ -189,20 +187,7 @@ class Grass(Technique):
                 frame.ledger.notes = (*frame.ledger.notes, told)
                 continue
             entries[material] = len(fields) - 1
-        key = (
-            tuple(id(one.patch) for one in fields),
-            tuple(
-                (
-                    one.size, one.height, one.density, one.map_size, one.varied,
-                    one.tiles, _map_keys(frame.snapshot, frame.snapshot.materials[material]),
-                )
-                for one, material in zip(fields, entries)
-            ),
-        )  # fmt: skip
-        if self._table is None or self._table[0] != key:
-            self._table = (key, images.upload(table_of(fields), TABLE[0]))
-            self._patches = [one.patch for one in fields]  # their ids stay theirs
-        table = self._table[1]
+        table = self._table.of(fields)
         stand_ins, layers = frame.shared(StandIns), frame.shared(Layers)
         for material, entry in entries.items():
             uv = uv_placed.map_of(frame.materials.compiled[material]) if fields[entry].tiles else -1
@@ -216,7 +201,7 @@ class Grass(Technique):
         frame.count(self, "bytes", table.bytes)
 
     def release(self) -> None:
-        self._table = None
+        self._table.forget()
 
 
 def _wanted(snapshot: Snapshot) -> list[int]:
@@ -244,10 +229,6 @@ def _map_key(snapshot: Snapshot, material: Material, name: str) -> Hashable:
     return None if image is None or image.missing else (image.key, image.version)
 
 
-def _map_keys(snapshot: Snapshot, material: Material) -> Hashable:
-    return tuple(_map_key(snapshot, material, name) for name in MAPS)
-
-
 def _map(snapshot: Snapshot, material: Material, name: str) -> np.ndarray | None:
     """(H, W) means of the channels, scene-linear for images that are sRGB."""
     key = _map_key(snapshot, material, name)
@@ -268,12 +249,3 @@ def _field(snapshot: Snapshot, material: Material) -> Field:
     shares, heights = (_map(snapshot, material, name) for name in MAPS)
     tiles = own_value(material.own, Grass, "tiles") if uv_placed.asks(material.own) else 0.0
     return Field(patch, size, height, density, shares, reach, varied, heights, tiles)
-
-
-def _field_key(snapshot: Snapshot, material: Material) -> Hashable:
-    try:
-        file = _file(material)
-        changed = file.stat().st_mtime_ns
-    except (PatchError, OSError):
-        return None
-    return str(file), changed, material.own, _map_keys(snapshot, material)

@@ -32,10 +32,10 @@ docs/log/2026-11-26-indirect-light.md.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import replace
 
 from ..frame.picture import Frame
+from ..frame.reads import Reads
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
@@ -120,7 +120,8 @@ class TracedRefraction(Technique):
     def __init__(self):
         # By glass, and by surfaces behind it.
         self._sources = PathSources(("transmission", "diffuse"), "refraction", WORLD_DIRECTIONS, EMISSIVE_POINTS)
-        self._interfaces: images.Image | None = None
+        # How the materials behind the first interface bend light, and what their insides absorb.
+        self._interfaces: Reads[images.Image] = Reads(upload_interfaces)
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         used = snapshot.used_materials
@@ -128,15 +129,8 @@ class TracedRefraction(Technique):
             return "no material is glass"
         return acceleration.too_many(snapshot)
 
-    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        return tuple(material.graph for material in snapshot.materials)
-
-    def prepare(self, frame: Frame) -> None:
-        """Tell the shader how the materials behind the first interface bend light, and what their insides absorb: three
-        texels for each."""
-        self._interfaces = upload_interfaces(frame.materials.compiled)
-
     def begin(self, frame: Frame) -> None:
+        self._table = self._interfaces.of(frame.materials.compiled)
         frame.kept(Reflectance).update(frame)
         self._sources.begin(frame)
 
@@ -177,7 +171,7 @@ class TracedRefraction(Technique):
         behind = self._draw_behind(frame)
         virtual_lights, near = self._indirect_light(frame)
         bindings["textures"] |= {
-            "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
+            "reflectance": frame.kept(Reflectance).image, "interface_table": self._table,
             "behind_position": behind.colors[0], "behind_albedo": behind.colors[1], "virtual_lights": virtual_lights,
         }  # fmt: skip
         bindings["constants"] |= {
@@ -211,10 +205,11 @@ class TracedRefraction(Technique):
         """Virtual lights and NEAR_CONSTANTS; where nothing provides them, of none and no bounces."""
         provided = frame.service(GatherBindings)
         if provided is None:
-            return self._interfaces, {name: 0 for _, name in NEAR_CONSTANTS}
+            return self._table, {name: 0 for _, name in NEAR_CONSTANTS}
         constants = {name: provided.bindings["constants"][name] for _, name in NEAR_CONSTANTS}
         return provided.bindings["textures"]["virtual_lights"], constants
 
     def release(self) -> None:
         self._sources.release()
-        self._interfaces = None
+        self._interfaces.forget()
+        self._table = None

@@ -16,6 +16,7 @@ from math import ceil, floor
 from .. import techniques
 from ..frame.bands import Bands
 from ..frame.picture import Frame
+from ..frame.reads import content
 from ..frame.run import Renderer
 from ..frame.settings import OFF, Settings
 from ..frame.within_sample import WithinSample
@@ -300,7 +301,7 @@ class Viewport:
     def _show_something(self, camera: Camera, size, border) -> None:
         """If the picture of this view is still to come, and what is shown is of another one: a first look at it."""
         pending = self._beginning is not None or not (self.frame.samples_done or self._waits)
-        place = _view_key(camera), size, border
+        place = content(camera, ("name",)), size, border
         if camera.panorama is not None:  # the look is drawn by straight lines
             return
         if not pending or (self._target is not None and self._shown_place == place and not self.looks):
@@ -336,7 +337,7 @@ class Viewport:
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Begin what is asked, at a fitting scale, if the frame is not of it."""
         asked = (
-            _view_key(camera),
+            content(camera, ("name",)),
             size,
             border,
             replace(settings, samples=0, values=self.renderer.drawn_with(settings)),
@@ -463,7 +464,7 @@ class Viewport:
         self.direct = begun.direct
         self._within = WithinSample(frame)
         self.seconds, self._finished, self._sample, self._compiled = 0.0, False, None, 0
-        self._begun_s, self._begun_for = begun.seconds, (_view_key(begun.camera), begun.size, begun.border)
+        self._begun_s, self._begun_for = begun.seconds, (content(begun.camera, ("name",)), begun.size, begun.border)
         self._waits = begun.why in AT_REST
         if begun.why == CHECKS:
             self._changed(begun, settings, clock)
@@ -496,8 +497,3 @@ def drawn_with(settings: Settings, scale: int, waits: bool) -> Settings:
 def only_direct(settings: Settings) -> Settings:
     """The same without indirect light and what glass lets through, which have the largest programs."""
     return replace(settings, bounces=0, slots={**settings.slots, "transmission": OFF})
-
-
-def _view_key(camera: Camera) -> tuple:
-    seen = camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end
-    return *seen, camera.aperture, camera.panorama
