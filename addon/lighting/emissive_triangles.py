@@ -15,7 +15,8 @@ from ..sources import lights
 
 LONG = 8.0  # squared longest side by area, from which on a triangle is halved; half a square has 4
 LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
-MOST_OWN, NEAR_TILES = 1024, 0.1  # triangles that pixels search; share of what is lit that is near
+MOST_OWN, NEAR_TILES = 16384, 0.1  # triangles that pixels search; share of what is lit that is near
+MOST_SPACED = 256  # points whose distance from each other is measured
 MOST_ASKED = 512  # triangles whose distance from what is lit is measured
 TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
@@ -103,19 +104,45 @@ class EmissiveTriangles:
         self._receivers = frame.receivers
 
     @property
-    def near(self) -> bool:
-        """Whether a tenth of what is lit is so near that points of all would be seen apart, and all triangles light
-        the same."""
-        boxes = self._receivers
-        if not self.power > 0 or len(self.radiance) > MOST_OWN or boxes is None or not len(boxes.distance):
+    def may_be_own(self) -> bool:
+        """Whether pixels may draw points of their own: the triangles are few, and all light the same."""
+        if not self.power > 0 or len(self.radiance) > MOST_OWN:
             return False
+        if self._receivers is None or not len(self._receivers.distance):
+            return False
+        return not any(self.unlit) and not any(self.passing) and bool((self.flags == self.flags[0]).all())
+
+    @property
+    def near(self) -> bool:
+        """Whether a tenth of what is lit is so near that points of all would be seen apart."""
+        boxes = self._receivers
         step = -(-len(boxes.distance) // 64)
         low, high = boxes.low[::step, None], boxes.high[::step, None]
-        places = self.corners.mean(axis=1)
+        places = self.corners[:: -(-len(self.corners) // MOST_ASKED)].mean(axis=1)
         gaps = np.maximum(np.maximum(low - places, places - high), 0.0)
         nearest = np.sqrt((gaps**2).sum(axis=2)).min(axis=1)
-        alike = not any(self.unlit) and not any(self.passing) and (self.flags == self.flags[0]).all()
-        return bool(alike and np.quantile(nearest, NEAR_TILES) < 0.75 * self.reach)
+        return bool(np.quantile(nearest, NEAR_TILES) < 0.75 * self.reach)
+
+    def spacing(self, count: int) -> float:
+        """Squared distance from one of `count` points to the next, m2, times what they are drawn in proportion to: the
+        median."""
+        asked = max(min(count, MOST_SPACED), 2)
+        numbers = (np.arange(asked)[:, None] * (0.0, 0.754878, 0.569840)) % 1.0
+        numbers[:, 0] = (np.arange(asked) + 0.5) / asked
+        drawn = [self.draw(*one) for one in numbers]
+        places, density = np.array([one[1] for one in drawn]), np.array([one[2] for one in drawn])
+        squared = ((places[:, None] - places) ** 2).sum(axis=2)
+        np.fill_diagonal(squared, np.inf)
+        return float(np.median(squared.min(axis=1) * density)) * self.power * asked / max(count, 1)
+
+    def beside(self, least: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """The box, low and high, in which a place may be nearer to a point than the root of `least` over what it is
+        drawn in proportion to; None where nothing there is lit."""
+        luminance = np.abs(self.radiance) @ lights.LUMINANCE
+        reach = float(np.sqrt(least / (luminance[luminance > 0].min() + self.level)))
+        corners, lit = self.corners.reshape(-1, 3), self._receivers
+        low, high = corners.min(axis=0) - reach, corners.max(axis=0) + reach
+        return (low, high) if ((lit.low <= high) & (low <= lit.high)).all(axis=1).any() else None
 
     def texels(self) -> np.ndarray:
         """(4 N, 4): what shaders/light/mesh_rays.glsl reads."""

@@ -14,8 +14,13 @@ As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissiv
 | maps | `points` x (1 view, or up to 6 cube faces), or a ray per pixel for each where that costs less |
 | passes | 1 over the screen |
 
-Where a tenth of what is lit stands nearer than the meshes are large, points that all pixels share would be seen as
-blotches: there each pixel draws eight of its own for a ray, and keeps one by what it brings (light/mesh_rays.glsl).
+Close to the meshes points that all pixels share would be seen as blotches. So each of them shines as from no nearer
+than about five times the way to its neighbours in the picture,
+
+    L_shared = f cos |cos_y| Le / max(r^2, r_0^2),   r_0^2 = SPREAD median(d_k^2 p_k) / p,   d_k from point to point
+
+and what this leaves out close by each pixel adds by points of its own: it draws eight for a ray and keeps one by what
+it brings (light/mesh_rays.glsl). Where a tenth of what is lit is as near as the meshes are large, all light comes so.
 
 Emission that varies is measured place by place (scene/emission_maps.py).
 
@@ -59,6 +64,7 @@ from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..surfaces.draw import LIT_SURFACES
 
+SPREAD = 25.0
 FEWEST_POINTS, MOST_POINTS = 32, 16  # in a whole picture, and in one of its samples
 
 
@@ -68,9 +74,12 @@ MESH_RAYS = Lookup(
     textures=(*acceleration.HIERARCHY_TEXTURES, ("RGBA32F", "mesh_lights")),
     constants=(
         *RAY_CONSTANTS,
+        ("VEC3", "near_low"),
         ("INT", "mesh_light_count"),
+        ("VEC3", "near_high"),
         ("FLOAT", "mesh_light_power"),
         ("FLOAT", "mesh_light_level"),
+        ("FLOAT", "mesh_light_least"),
     ),
     defines=(("OWN_POINTS", "1"), ("CANDIDATE_POINTS", "8")),
     maps=False,
@@ -94,7 +103,9 @@ class EmissiveLight(Technique):
         self._maps, self._rays = PlainMaps(self._resolution), Rays()
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
-        self._near: images.Image | None = None  # its triangles, where each pixel has points of its own
+        self._own: images.Image | None = None  # its triangles, where pixels have points of their own
+        self._left_out = 0.0  # of shared points: least squared distance, m2, times what they are drawn in proportion to
+        self._beside: tuple[np.ndarray, np.ndarray] | None = None  # the box in which they do; None: everywhere
         self._traced: bool | None = None  # whether rays take the place of maps; None: not decided yet
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -107,11 +118,11 @@ class EmissiveLight(Technique):
 
     def begin(self, frame: Frame) -> None:
         self._traced = None
-        self._near = None
+        self._own = self._beside = None
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         self._triangles = EmissiveTriangles(frame, ("diffuse", "glossy"))
-        self._near = self._own_points(frame)
+        self._choose_own(frame)
         frame.provide(EmissivePoints(self._triangles.power, float(self._count(frame.settings))))
 
     def sample(self, frame: Frame) -> Iterator[None]:
@@ -125,14 +136,15 @@ class EmissiveLight(Technique):
         flags = lights.SHADOW_FLAG + lights.TRACED_FLAG + lights.GLASS_BLOCKS_FLAG * blocked
         provider = frame.service(VisibilityProvider)
         patches = provider is not None and provider.serves_every_source(frame)
-        if self._near is not None:
-            row = self._triangles.row((0.5, 0.5, 0.5), count, flags, 1, 8.0 * frame.settings.samples)
-            points = [LightPoint(row, self._rays)] * count
+        own = self._triangles.row((0.5, 0.5, 0.5), count, flags, 1, 8.0 * frame.settings.samples)
+        if self._own is not None:
+            points = [LightPoint(own, self._rays)] * count
             yield from light_surfaces(
                 frame, self, points, 1 << lights.SURFACE, self._sources, lambda *_: self._own_rays(frame)
             )
-            frame.count(self, "rays per pixel", count)
-            return
+            frame.account.count(self, "rays per pixel", count)
+            if self._beside is None:
+                return
         points = []
         for k in range(count):
             number = frame.sample * count + k
@@ -154,35 +166,43 @@ class EmissiveLight(Technique):
             views = [replace(view, glass_blocks=True) for view in views] if blocked else views
             row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)
             points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
+        for point in points if self._own is not None else ():
+            point.row[lights.LIGHT.at.least] = (
+                self._left_out * point.row[lights.LIGHT.at.area] * count / self._triangles.power
+            )
         yield from light_surfaces(frame, self, points, 1 << lights.SURFACE, self._sources)
 
-    def _own_points(self, frame: Frame) -> images.Image | None:
-        """The triangles, where pixels draw points of their own: near a mesh, points that all pixels share are seen as
-        blotches. None where they are shared."""
+    def _choose_own(self, frame: Frame) -> None:
+        """Whether pixels draw points of their own, and where."""
         provider = frame.service(VisibilityProvider)
         patches = provider is not None and provider.serves_every_source(frame)
         # Maps ask the material of a layer itself; rays know it by cells.
         layered = any(material.transparent for material in frame.materials.compiled)
-        if (
-            patches
-            or layered
-            or frame.settings.schedule.is_draft
-            or not self._triangles.near
-            or not frame.snapshot.casts_shadows
-        ):
-            return None
-        if frame.hierarchy("shadow") is None:
-            return None
-        frame.account.chose(self, "points", "of each pixel's own, because surfaces stand close to emissive meshes")
-        return images.upload_list(self._triangles.texels())
+        if patches or layered or frame.settings.schedule.is_draft or not frame.snapshot.casts_shadows:
+            return
+        if not self._triangles.may_be_own or frame.hierarchy("shadow") is None:
+            return
+
+        if not self._triangles.near:
+            count = self._count(frame.settings) * frame.settings.samples
+            self._left_out = SPREAD * self._triangles.spacing(count)
+            self._beside = self._triangles.beside(self._left_out)
+            if self._beside is None:
+                return
+        said = "of each pixel's own, because surfaces stand close to emissive meshes"
+        frame.account.chose(self, "points", said if self._beside is None else f"{said}; farther off the picture's")
+        self._own = images.upload_list(self._triangles.texels())
 
     def _own_rays(self, frame: Frame) -> Maps:
         textures, constants = ray_bindings(frame)
+        low, high = (np.zeros(3),) * 2 if self._beside is None else self._beside
         return Maps(
-            None, NO_VIEWS, MESH_RAYS, textures={**textures, "mesh_lights": self._near},
+            None, NO_VIEWS, MESH_RAYS, textures={**textures, "mesh_lights": self._own},
             constants={
                 **constants, "mesh_light_count": len(self._triangles.radiance),
                 "mesh_light_power": self._triangles.power, "mesh_light_level": self._triangles.level,
+                "mesh_light_least": 0.0 if self._beside is None else self._left_out,
+                "near_low": low, "near_high": high,
             },
         )  # fmt: skip
 
@@ -211,7 +231,7 @@ class EmissiveLight(Technique):
     def _count(self, settings: Settings) -> int:
         """Points per sample: more where a picture of few samples would have few in all."""
         points = settings.get(self, "points")
-        if self._near is not None:  # a ray of each stands for several points
+        if self._own is not None and self._beside is None:  # a ray of each stands for several points
             return max(points // 2, min(FEWEST_POINTS // 2 // settings.samples, MOST_POINTS // 4))
         return (
             max(points, min(FEWEST_POINTS // settings.samples, MOST_POINTS))
@@ -222,7 +242,7 @@ class EmissiveLight(Technique):
     def release(self) -> None:
         self._maps.release()
         self._sources.release()
-        self._triangles = self._near = None
+        self._triangles = self._own = self._beside = None
 
 
 def _views(frame: Frame, point: np.ndarray, number: int, resolution: int) -> list[depth_maps.MapView]:

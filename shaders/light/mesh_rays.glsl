@@ -2,6 +2,10 @@
 // kept, in proportion to the light that it brings there if nothing is in the way, and stands for all of them (resampled
 // importance sampling, Talbot et al. 2005). So what is unblocked has the noise of CANDIDATE_POINTS, for one ray.
 //
+// With `mesh_light_least` above 0 they bring what points that all pixels share leave out: to those a point is no nearer
+// than the root of mesh_light_least over its luminance. Nothing is missing outside of the box from `near_low` to
+// `near_high`.
+//
 // `mesh_lights`, a list of four texels for each triangle: corner; w: sum of the power up to it, as a share of all | edge;
 // w: 1 where it shines to its normal's side alone | other edge; w: -1 where the normal is turned | radiance.
 #include "light/sources.glsl"
@@ -38,12 +42,16 @@ Light own_point(Light light, int number)
   float first = scrambled(film_view.bits_x, salt.x);
   float second = scrambled(film_view.bits_y, salt.y);
   vec3 position = surface_position_fetch(pixel).xyz;
+  light.radiance = vec3(0.0);
+  if (mesh_light_least > 0.0 && any(greaterThan(abs(2.0 * position - near_low - near_high), near_high - near_low))) {
+    return light;
+  }
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).xy);
   float roll = to_unit(hash3(uvec3(salt.z, uint(film_view.sample_index), uint(number))).x);
   float total = 0.0;
   float chosen = 0.0;
   float bright = 1.0;
-  light.radiance = vec3(0.0);
+  float missing = 1.0;
   for (int k = 0; k < CANDIDATE_POINTS; k++) {
     float x = (float(number) + (float(k) + first) / float(CANDIDATE_POINTS)) / float(light_count);
     int triangle = mesh_light_at(x);
@@ -62,16 +70,22 @@ Light own_point(Light light, int number)
     float cos_light = -dot(direction, facing);
     cos_light = (edge.w > 0.5) ? max(cos_light, 0.0) : abs(cos_light);
     // What is drawn more often counts the less: in proportion to luminance and, as often, to area.
-    float share = cos_light / squared * (0.1 + 0.9 * max(dot(normal, direction), 0.0));
     float shining = luminance(abs(radiance));
-    share *= shining / max(shining + mesh_light_level, 1e-30);
+    float often = shining + mesh_light_level;
+    float left_out = 1.0;
+    if (mesh_light_least > 0.0) {
+      left_out = 1.0 - min(squared * often / mesh_light_least, 1.0);
+    }
+    float share = left_out * cos_light / squared * (0.1 + 0.9 * max(dot(normal, direction), 0.0));
+    share *= shining / max(often, 1e-30);
     total += share;
     float chance = share / max(total, 1e-30);
     bool taken = share > 0.0 && roll < chance;
     roll = clamp(taken ? roll / chance : (roll - chance) / max(1.0 - chance, 1e-6), 0.0, 1.0);
     if (taken) {
       chosen = share;
-      bright = shining + mesh_light_level;
+      bright = often;
+      missing = left_out;
       light.point = light.centre = point;
       light.axis = facing;
       light.radiance = radiance;
@@ -80,7 +94,7 @@ Light own_point(Light light, int number)
   }
   // The density by which lobes share their light with points is that of a point alone: both sides know it.
   light.area = mesh_light_power / max(bright * float(light_count), 1e-30);
-  light.radiance *= total / max(float(CANDIDATE_POINTS) * chosen, 1e-30);
+  light.radiance *= missing * total / max(float(CANDIDATE_POINTS) * chosen, 1e-30);
   return light;
 }
 

@@ -120,7 +120,6 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     float squared = max(dot(to_light, to_light), 1e-30);
     direction = to_light * inversesqrt(squared);
     float path = sqrt(squared);
-    squared = max(squared, light_least(light));
     float cos_light = -dot(direction, light.axis);
     if (LIGHT_IS(light, LIGHT_SURFACE)) {
       cos_light = ((light.flags & LIGHT_SIDED) != 0) ? cos_light : abs(cos_light);
@@ -128,8 +127,8 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     if (cos_light <= 0.0) {
       return vec3(0.0);
     }
-    float solid_angle = light.area * cos_light / squared;
-    density = 1.0 / max(solid_angle, 1e-30);
+    density = squared / max(light.area * cos_light, 1e-30);  // lobes know it, however near the light is
+    float solid_angle = light.area * cos_light / max(squared, light_least(light));
     vec3 radiance = light.radiance * light_tree(light, -direction, light.point, path);
     return radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
   }

@@ -242,3 +242,19 @@ def test_long_triangles_are_halved():
     areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
     assert np.bincount(source, areas) == pytest.approx([10.0, 0.5])
     assert np.linalg.norm(sides, axis=2).max() < 3.0 and np.count_nonzero(source == 1) == 1
+
+
+def test_beside_a_strip_that_is_near_to_few_pixels_few_samples_have_no_blotches(floor):
+    """A strip of 1.5 m above the floor: close by, pixels add what points of all leave out."""
+    half, z = (0.75, 0.01), 0.1
+    corners = [(x * half[0], y * half[1], z) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    floor.mesh(corners, [(0, 1, 2, 3)], material=floor.glow).visible_camera = False
+    area = 4 * half[0] * half[1]
+    source = model.area((0, 0, z), (half[0] * 2, 0, 0), (0, half[1] * 2, 0), RADIANCE * area * np.pi)
+    expected = model.irradiance(source, receivers(1)).reshape(SIZE)
+    found = np.array([floor.render(4, SIZE, seed=seed)["diffuse_direct"][..., 0] for seed in range(4)]) * np.pi
+    ratio = found / expected
+    assert "farther off the picture's" in str(floor.ledger.row("emissive_light").choices)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
+    assert np.sqrt(((ratio - 1) ** 2).mean()) < 0.035  # .052 with points of all alone
+    assert np.sqrt(((ratio - 1) ** 2)[:, 12:20, 8:24].mean()) < 0.07  # .119
