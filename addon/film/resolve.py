@@ -83,7 +83,8 @@ def resolve(frame: Frame) -> images.Image:
                 target,
                 textures=read,
                 constants={
-                    "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
+                    "scale": 1.0 / (frame.samples_done + frame.part_done or 1.0),
+                    "exposure": frame.snapshot.film.exposure,
                     "transparent": int(frame.snapshot.film.transparent),
                 },
             )  # fmt: skip

@@ -78,6 +78,7 @@ class Frame:
     at: str = ""  # label of the technique that is at work, or was last
     film_points: int = 1  # that a sample shows; the surface technique says it before it looks
     samples_done: int = 0
+    part_done: float = 0.0  # of the first sample, what its sums hold already and can be shown
     numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice
     first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
     drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts

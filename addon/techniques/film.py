@@ -208,14 +208,18 @@ class Film(Technique):
         frame.count(self, "points", count)
         if frame.is_first and asked > 1 and film_points.by_costs(frame):
             frame.account.chose(self, "points", film_points.costs(frame).why(asked))
+        for path in (*self._apart, *self._pixel_paths):
+            frame.held.shown[f"radiance.{path}"] = f"film.{path}"
         if count > 1:
-            yield
-            yield from self._between(frame, count)
+            try:
+                frame.part_done = 0.0 if frame.samples_done else 1.0 / count
+                yield
+                yield from self._between(frame, count)
+            finally:
+                frame.part_done = 0.0
         for paths in (self._paths, self._pixel_paths):
             _clear(frame, tuple(f"radiance.{path}" for path in paths))
         repeated_light.forget(frame)
-        for path in (*self._apart, *self._pixel_paths):
-            frame.held.shown[f"radiance.{path}"] = f"film.{path}"
 
     def show(self, frame: Frame) -> None:
         if frame.plan.last_writer(COMBINED) is self:
@@ -291,6 +295,7 @@ class Film(Technique):
                     self._collect(frame, bindings, collected, added)
                     by_pixel = {path: frame.images[f"radiance.{path}"] for path in self._pixel_paths}
                     self._filter(frame, collected, by_path | by_pixel, bindings, point, 1.0 / count)
+                    frame.part_done = 0.0 if frame.samples_done else (point - first + 2) / count
                     yield
             finally:
                 frame.look()

@@ -222,7 +222,7 @@ class Viewport:
         spent = 0.0
         while frame.samples_done < settings.samples:
             spent = self._work(frame, clock, budget)
-            if self._sample is None:
+            if self._sample is None or (frame.part_done and self.scale == 1 and self.render_pass is None):
                 self._resolve(frame)  # now: the next sample, once it has begun, changes the images that are shown
             fresh = library.news() != known
             if (self._waits or frame.samples_done or fresh) and clock() - called + spent > budget:
@@ -262,7 +262,9 @@ class Viewport:
             self._drop_picture()
             self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
         if self.render_pass is None:
+            at = frame.at
             passes.copy(self.renderer.show(frame), self._target)
+            frame.at = at
         else:
             one_pass.draw(frame, self.render_pass, self._target)
         self._shown_with, self.looks = frame.plan.shown_with(frame.snapshot, frame.settings), False

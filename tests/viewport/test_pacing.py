@@ -1,11 +1,14 @@
 """When the viewport is coarse and fine, and how long a redraw works."""
 
+import itertools
+
 import bpy
 import numpy as np
 import pytest
 
 from addon import viewport
 from addon.gfx import images
+from addon.viewport.picture import Viewport
 from tests.viewport.region import SIZE
 
 
@@ -176,3 +179,22 @@ def test_draft_has_the_shapes_of_the_surfaces_that_it_shows(region):
         return np.abs(fine - whole).mean()
 
     assert error(region.viewport.shown) < 0.8 * error(region.viewport.picture)
+
+
+def test_first_sample_is_shown_as_it_grows(region, monkeypatch):
+    """Where it has several points of the film: what its sums hold so far, as bright as the whole."""
+    bpy.context.scene.candela.viewport_samples = 1
+    region.viewport.pace.cost = {1: 10.0, 2: 0.3, 4: 0.06}
+    shown, parts = [], []
+    resolve = Viewport._resolve
+
+    def resolving(self, frame):
+        resolve(self, frame)
+        if self.scale == 1:
+            parts.append(frame.part_done)
+            shown.append(images.read(self.picture)[..., :3].mean())
+
+    monkeypatch.setattr(Viewport, "_resolve", resolving)
+    region.rest()
+    assert len(parts) > 2 and parts[-1] == 0.0 and all(a < b for a, b in itertools.pairwise(parts[:-1]))
+    np.testing.assert_allclose(shown, shown[-1], rtol=0.05)
