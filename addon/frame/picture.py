@@ -20,7 +20,7 @@ from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
 from ..sampling.lens import point_of
-from ..sampling.sequence import FILM, LENS, point, third, uniform
+from ..sampling.sequence import FILM, LENS, alike, point, third, uniform
 from ..scene import panorama
 from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.emission_maps import EmissionMaps
@@ -139,9 +139,12 @@ class Frame:
         """A number of this sample that chooses among things, of which the chosen one then draws a point."""
         return uniform(self.sample, use, self.settings.seed)
 
-    def random_volume(self, use: str, at: int | None = None) -> tuple[float, float, float]:
-        """A point with a third number."""
-        return *self.random(use, at), third(self.sample if at is None else at, use, self.settings.seed)
+    def random_volume(self, use: str, at: int | None = None, evenly: bool = False) -> tuple[float, float, float]:
+        """A point with a third number; `evenly`: of the set that stands for parts of what is drawn (sequence.alike)."""
+        at = self.sample if at is None else at
+        if evenly:
+            return alike(at, use, self.settings.seed)
+        return *self.random(use, at), third(at, use, self.settings.seed)
 
     def look(self, lens: tuple[float, float] | None = None, film: int | None = None) -> None:
         """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its

@@ -225,7 +225,8 @@ class Photons:
             texels = max(round(grid / np.sqrt(parts)), least)
             for number in range(index * parts, (index + 1) * parts):
                 middle = alone and parts == 1
-                sample = emitter.middle() if middle else emitter.sample(*frame.random_volume("light", number))
+                drawn = frame.random_volume("light", number, evenly=parts > 1 and emitter.is_flat)
+                sample = emitter.middle() if middle else emitter.sample(*drawn)
                 shift = frame.random("caustics/grid", number)
                 for low, high in boxes:
                     for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):

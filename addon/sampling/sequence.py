@@ -167,6 +167,14 @@ def uniform(index: int, use: str, seed: int = 0) -> float:
     return _axis(index // BLOCK, 7, use, seed)[index % BLOCK]
 
 
+def alike(index: int, use: str, seed: int = 0) -> tuple[float, float, float]:
+    """`point` and `third`, shifted alike in place of scrambled: of the first 2^k points each lies at the same place of
+    its cell. So parts of a light lie as far apart as they can, where each point stands for the part around it."""
+    salt = zlib.crc32(f"{use}/{seed}".encode())
+    numbers = [int(bits(np.uint64(index), axis)) ^ _mixed(salt + axis + 1) for axis in range(3)]
+    return tuple(number / 4294967296.0 for number in numbers)
+
+
 def pixel_bits(index: int) -> tuple[int, int, int, int]:
     """Dimensions 1, 2, 6, 7 of point `index` as signed 32-bit integers, for shaders to scramble per pixel."""
     return _unscrambled(index // BLOCK)[index % BLOCK]

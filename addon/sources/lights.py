@@ -96,6 +96,11 @@ class Emitter:
         return self.kind in (RECTANGLE, ELLIPSE)
 
     @property
+    def is_flat(self) -> bool:
+        """Whether two numbers choose a point of it: of a ball's, depths fill in what the first two leave."""
+        return self.kind not in (POINT, SPHERE)
+
+    @property
     def concentration(self) -> float:
         """How much brighter it is along its axis than without a spread (spread_attenuation in light/sources.glsl)."""
         half = np.arctan(self.spread)

@@ -114,7 +114,7 @@ class DirectLight(Technique):
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
                 cell = 1.0 if part else provider.cell(frame, number, points)
                 whole = cell >= 1.0 and emitter.extended and emitter.maps is None
-                drawn = frame.random_volume("light", number)
+                drawn = frame.random_volume("light", number, evenly=0.0 < cell < 1.0 and emitter.is_flat)
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*drawn)
                 near = bool(service) and provider.asks_views and cell == 0.0 and emitter.light.key in self._near

@@ -126,3 +126,16 @@ def test_the_first_points_of_many_uses_fill_the_plane():
     for pair in ((0, 1), (0, 2), (1, 2)):
         counts, *_ = np.histogram2d(*first[:, pair].T, bins=8, range=((0, 1), (0, 1)))
         assert counts.min() > 0.5 * 62.5 and counts.max() < 1.6 * 62.5
+
+
+def test_points_that_are_shifted_alike_lie_at_the_same_place_of_their_cells():
+    """Sixteen of each of twenty uses are a net whose points have one remainder; one point of many uses is anywhere."""
+    for k in range(20):
+        points = np.array([sequence.alike(number, f"use {k}") for number in range(16)])
+        np.testing.assert_allclose(np.ptp(points % (1 / 16), axis=0), 0.0, atol=1e-9)
+        for cells in ((16, 1), (4, 4), (1, 16)):
+            assert len({tuple(place) for place in (points[:, :2] * cells).astype(int)}) == 16
+    first = np.array([sequence.alike(0, f"use {k}") for k in range(4000)])
+    for pair in ((0, 1), (0, 2), (1, 2)):
+        counts, *_ = np.histogram2d(*first[:, pair].T, bins=8, range=((0, 1), (0, 1)))
+        assert counts.min() > 0.5 * 62.5 and counts.max() < 1.6 * 62.5

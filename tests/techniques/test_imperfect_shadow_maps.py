@@ -70,15 +70,17 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
 
 @pytest.mark.slow
 def test_a_closed_box_that_shines_loses_and_gains_nothing(stage, render):
-    """Radiance 1 and albedo 1/2: each wall sends out 2 in all, so what it gets from others' reflection is 1/2."""
+    """Radiance 1 and albedo 1/2: each wall sends out 2 in all, so what it gets from others' reflection is 1/2. What
+    points of the walls' own light lack close by falls with the root of the samples: .967, .985 of 16, 64."""
     shining = stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), IOR=1.0, Emission_Strength=1.0)
     shining.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1, 1, 1, 1)
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     stage.mesh(corners, faces, material=shining)
     stage.camera((0.3, 0.2, -0.1), (1.2, 0.3, 0.4), angle=1.4)
-    found = [render(12, samples=16, seed=seed).mean() for seed in range(4)]
-    assert np.mean(found) == pytest.approx(0.5, rel=0.03)
+    few, many = (np.mean([render(12, samples=n, seed=seed).mean() for seed in range(2)]) for n in (16, 64))
+    assert many == pytest.approx(0.5, rel=0.03)
+    assert abs(many - 0.5) < 0.7 * abs(few - 0.5)
 
 
 @pytest.mark.slow

@@ -76,8 +76,8 @@ def test_points_that_stand_for_parts_of_the_light_leave_less_error_than_points(f
     expected = expected_visibility(source, [EDGE])
 
     def errors():
-        """With 16 and with 64 samples; the mean of three seeds."""
-        return [np.mean([rms(visibility(floor, source, n, seed=k), expected) for k in range(3)]) for n in (16, 64)]
+        """With 16 and with 64 samples; the mean of eight seeds."""
+        return [np.mean([rms(visibility(floor, source, n, seed=k), expected) for k in range(8)]) for n in (16, 64)]
 
     parts = errors()
     floor.scene.candela.slot_shadow = "accumulated_maps"
