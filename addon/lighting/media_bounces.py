@@ -74,11 +74,11 @@ def _shining(shining: bool) -> tuple[tuple[str, str], ...]:
 
 
 @cache
-def walks_program(start: str, kinds: int, world: bool, shining: bool, once: bool) -> Program:
+def walks_program(start: str, kinds: int, world: bool, shining: bool, once: bool, alone: bool = False) -> Program:
     """Finds light along walks. `shining`: and apart from it what comes straight from media that shine; `once`: media
-    scatter it once."""
+    scatter it once; `alone`: only what comes straight from media that shine."""
     return passes.fullscreen_program(
-        f"walks in media from {start}{', scattered once' if once else ''}",
+        f"walks in media from {start}{', scattered once' if once else ''}{', straight ones' if alone else ''}",
         "media/indirect.frag.glsl",
         textures=(
             *LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "reflectance"),
@@ -91,8 +91,9 @@ def walks_program(start: str, kinds: int, world: bool, shining: bool, once: bool
         ),
         defines=(
             *defines_of(kinds, world), *START[start], *_shining(shining), *((("ONE_SCATTER", "1"),) if once else ()),
+            *((("STRAIGHT_ALONE", "1"),) if alone else ()),
         ),
-        outputs=(("VEC4", "out_found"), *((("VEC4", "out_straight"),) if shining else ())),
+        outputs=(("VEC4", "out_found"), *((("VEC4", "out_straight"),) if shining and not alone else ())),
     )  # fmt: skip
 
 
@@ -131,6 +132,7 @@ def surfaces_program(shining: bool) -> Program:
 
 DECLARED = (
     *(walks_program(start, -1, start == CELLS, start != PIXELS, start == ON_SURFACES) for start in START),
+    *(walks_program(start, -1, False, True, False, True) for start in (PIXELS, CELLS)),
     *(program(shining) for program in (cells_program, surfaces_program) for shining in (False, True)),
 )
 
@@ -145,25 +147,26 @@ class MediaBounces:
         self, frame: Frame, technique: Technique, media: Media, lit: Lit, asked: dict[str, object], bounces: int
     ) -> Iterator[None]:
         """`asked`: values of CONSTANTS but the pixel's; `bounces`: before a medium scatters light to the eye. Surfaces
-        get light that media have scattered once more than that, as in Cycles, between any number of surfaces."""
+        get light that media have scattered once more than that, as in Cycles, between any number of surfaces. What
+        media send out themselves they scatter once even without bounces, as they do light of lamps."""
         self._reflectance.update(frame)
         spread = frame.settings.samples < MANY and min(frame.size) >= SMALL
         self._walks = FEW_WALKS if frame.settings.samples < FEW else WALKS
         yield from self._onto_surfaces(frame, technique, media, lit, asked, bounces + 1, spread)
-        if not bounces or not media.scatters:
+        if not media.scatters or not (bounces or media.emits):
             return
         if spread:
             yield from self._in_cells(frame, technique, media, lit, asked, bounces)
             return
-        names = _names("volume", media.emits)
-        program = walks_program(PIXELS, lit.kinds, lit.world, media.emits, False)
+        names = _names("volume", media.emits)[0 if bounces else 1 :]
+        program = walks_program(PIXELS, lit.kinds, lit.world, media.emits, False, not bounces)
         bound = self._bound(frame, lit, program)
         constants = asked | {
             "shown_pixel": (0, 0),
             "stride": 1,
             "is_spread": 0,
             "walks": 1,
-            "bounces": bounces,
+            "bounces": max(bounces, 1),
             "scatters": EVERY,
         }
         target = frame.target(*names)
@@ -174,15 +177,16 @@ class MediaBounces:
 
     def _in_cells(self, frame, technique, media, lit, asked, bounces) -> Iterator[None]:
         grid = froxels.froxels(frame, media)
-        found = grid.take(1 + media.emits)
-        program = walks_program(CELLS, lit.kinds, lit.world, media.emits, False)
+        both = bool(bounces and media.emits)
+        found = grid.take(1 + both)
+        program = walks_program(CELLS, lit.kinds, lit.world, media.emits, False, not bounces)
         constants = asked | grid.constants
         constants |= {
             "shown_pixel": (0, 0),
             "stride": 1,
             "is_spread": 1,
             "walks": self._walks,
-            "bounces": bounces,
+            "bounces": max(bounces, 1),
             "scatters": EVERY,
         }
         passes.fullscreen(
@@ -190,7 +194,8 @@ class MediaBounces:
         )  # fmt: skip
         yield
         passes.fullscreen(
-            cells_program(media.emits), frame.target(*_names("volume", media.emits)), blend="ADDITIVE_PREMULT",
+            cells_program(both), frame.target(*_names("volume", media.emits)[0 if bounces else 1 :]),
+            blend="ADDITIVE_PREMULT",
             textures={
                 **media.textures, "surface_position": frame.images["surface.position"],
                 **dict(zip(("froxel_light", "froxel_straight"), found)),

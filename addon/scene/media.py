@@ -10,7 +10,7 @@ Media of glass are left to the technique that follows light through it (techniqu
 | cost | |
 |---|---|
 | bake | one evaluation of the tree per cell, when tree or object change |
-| memory | 48 bytes per cell; 10 texels per medium; the boundaries' tree as in acceleration.py |
+| memory | 48 bytes per cell; 13 texels per medium; the boundaries' tree as in acceleration.py |
 
 Bias: detail finer than a cell is lost; a tree of the world is known within the scene's bounds, and goes on beyond them
 as at their rim. More than MOST_MEDIA are not drawn.
@@ -36,8 +36,10 @@ from .materials import MATERIAL_SCENE, values_block, values_struct
 from .textures import upload_texture
 
 MOST_MEDIA = 30
-MEDIUM_TEXELS = 10  # layout in shaders/media/media.glsl
+MEDIUM_TEXELS = 13  # layout in shaders/media/media.glsl
+MOST_BOXES = 4  # of boundaries, up to which programs meet planes in place of a tree
 LARGEST_COEFFICIENT, LARGEST_EMISSION = 1e10, 1e20  # per metre: what float32 can still multiply by distances
+MOST_FLAT, EVEN = 1e4, 1e-4  # a box's longest side over its shortest; parts of its sides by which it may be off
 MOST_CELLS = 2**23  # of all grids
 MEDIA_TEXTURES = tuple(("RGBA32F", f"media_{name}") for name in ("table", "scattering", "emission"))
 ATTENUATION_TEXTURES = MEDIA_TEXTURES[:1]  # what asks for transmittance alone reads these
@@ -176,6 +178,25 @@ def filled(snapshot: Snapshot, compiled: list[CompiledMaterial], origin: np.ndar
         text = f"{len(found)} volumes are more than the {MOST_MEDIA} that are drawn; the last ones are left out."
         notes.append(Note("Scene", text))
     return found[:MOST_MEDIA], notes
+
+
+def box_rows(one: Filled) -> np.ndarray | None:
+    """(3, 4) rows that take a place into the box of a medium's grid, 0..1 there, if its boundary is this box and faces
+    outwards; else None."""
+    if np.linalg.cond(one.to_world[:, :3]) > MOST_FLAT:
+        return None
+    rows = np.linalg.inv(np.vstack([one.to_world, (0, 0, 0, 1)]))[:3]
+    corners = one.corners @ rows[:, :3].T + rows[:, 3]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area *= np.sign(np.linalg.det(rows[:, :3]))
+    on_none = np.ones(len(corners), bool)
+    for axis, side in itertools.product(range(3), (0, 1)):
+        on = np.all(np.abs(corners[:, :, axis] - side) < EVEN, axis=1)
+        on_none &= ~on
+        outwards = (2 * side - 1) * area[on, axis]
+        if np.any(outwards < -EVEN) or abs(outwards.sum() - 1.0) > EVEN:
+            return None
+    return None if on_none.any() else rows
 
 
 def _affine(outer: np.ndarray, inner: np.ndarray) -> np.ndarray:
@@ -355,6 +376,10 @@ class Media:
         tree = self._boundaries(first)
         nodes, leaves = tree.boxes.rows.reshape(-1, 4), tree.leaves.reshape(-1, 4)
         self.first_row = -(-(len(table) + len(nodes) + len(leaves)) // images.LIST_WIDTH)
+        boxes = [box_rows(one) for one in self.found if one.corners is not None]
+        are_boxes = 0 < len(boxes) <= MOST_BOXES and all(rows is not None for rows in boxes)
+        for k, box in enumerate(boxes if are_boxes else ()):
+            table[(k + 1) * MEDIUM_TEXELS + 10 : (k + 2) * MEDIUM_TEXELS] = box
         rows, self.cells = 0, 0
         jobs = []
         for k, one in enumerate(self.found):
@@ -378,7 +403,9 @@ class Media:
         self.textures["media_table"].defines = (
             *((("MEDIA_WORLD", "1"),) if first == 0 else ()),
             *((("MEDIA_BOUNDED", "1"),) if any(one.corners is not None for one in self.found) else ()),
+            *((("MEDIA_BOXES", str(len(boxes))),) if are_boxes else ()),
             *((("MEDIA_GRIDS", "1"),) if jobs else ()),
+            *((("MEDIA_ONE_LOBE", "1"),) if all(one.medium.phase == PHASES[0] for one in self.found) else ()),
             *((("MEDIA_APART", "1"),) if apart else ()),
         )
         self.notes = tuple(notes)

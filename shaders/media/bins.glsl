@@ -4,8 +4,21 @@
 #include "media/media.glsl"
 #include "media/phase.glsl"
 
-#define MOST_BINS 24
 #define GRID_BINS 12  // at most, of one interval between boundaries
+#if !defined(MEDIA_BOUNDED) || (defined(MEDIA_BOXES) && MEDIA_BOXES == 1 && !defined(MEDIA_WORLD))
+#define MOST_INTERVALS 1  // in media
+#elif defined(MEDIA_BOXES)
+#define MOST_INTERVALS (2 * MEDIA_BOXES + 1)
+#else
+#define MOST_INTERVALS 24
+#endif
+#if !defined(MEDIA_GRIDS)
+#define MOST_BINS MOST_INTERVALS
+#elif MOST_INTERVALS == 1
+#define MOST_BINS GRID_BINS
+#else
+#define MOST_BINS 24
+#endif
 
 struct Bins {
   int count;

@@ -2,10 +2,17 @@
 //
 // The tree is that of addon/scene/acceleration.py over the meshes that bound media alone; a triangle's material number
 // is that of its medium. Nothing is known of a ray's start: a medium is around it if the first crossing of its boundary
-// leads out. So rays may start anywhere, on boundaries too, without any state from other rays.
+// leads out. So rays may start anywhere, on boundaries too, without any state from other rays. MEDIA_BOXES: boundaries are so
+// many boxes, each met by its planes in place of the tree, as `media_table` has them.
 #include "lib/math.glsl"
 
+#ifdef MEDIA_BOXES
+#define MOST_CROSSINGS (2 * MEDIA_BOXES)
+#elif defined(MEDIA_BOUNDED)
 #define MOST_CROSSINGS 12
+#else
+#define MOST_CROSSINGS 1
+#endif
 
 struct Crossings {
   int count;
@@ -41,7 +48,46 @@ uint media_seen;
 // Two crossings that are one: into or out of the same medium at the same place.
 #define SAME_PLACE 1e-5
 
-#ifdef MEDIA_BOUNDED
+#ifdef MEDIA_APART
+void media_see()
+{
+  vec4 listed = media_table_fetch(ivec2(2046 - media_ray, 0));
+  media_seen = uint(listed.x) | (uint(listed.y) << 15u);
+}
+#endif
+
+#define MEDIUM_TEXELS 13
+
+#if defined(MEDIA_BOXES)
+#define FIRST_BOX 1  // bit 0 is the world's
+
+// Where a ray enters a medium's box and where it leaves it; not in this order where it passes by.
+vec2 media_box(int medium, vec3 origin, vec3 direction)
+{
+  vec4 x = media_table_fetch(ivec2(medium * MEDIUM_TEXELS + 10, 0));
+  vec4 y = media_table_fetch(ivec2(medium * MEDIUM_TEXELS + 11, 0));
+  vec4 z = media_table_fetch(ivec2(medium * MEDIUM_TEXELS + 12, 0));
+  vec3 place = vec3(dot(x.xyz, origin) + x.w, dot(y.xyz, origin) + y.w, dot(z.xyz, origin) + z.w);
+  vec3 way = vec3(dot(x.xyz, direction), dot(y.xyz, direction), dot(z.xyz, direction));
+  vec3 inverse = vec3(1.0) / mix(way, vec3(1e-20), equal(way, vec3(0.0)));
+  vec3 low = -place * inverse;
+  vec3 high = (vec3(1.0) - place) * inverse;
+  vec3 enter = min(low, high);
+  return vec2(max_component(enter), -max_component(-max(low, high)));
+}
+
+void crossings_insert(float t, int medium)
+{
+  int place = crossings.count;
+  for (; place > 0 && crossings.t[place - 1] > t; place--) {
+    crossings.t[place] = crossings.t[place - 1];
+    crossings.medium[place] = crossings.medium[place - 1];
+  }
+  crossings.t[place] = t;
+  crossings.medium[place] = medium;
+  crossings.count++;
+}
+#elif defined(MEDIA_BOUNDED)
 #define MEDIA_NODE 4   // texels of a node and of a leaf, as in addon/scene/acceleration.py
 #define MEDIA_LEAF 17
 #define MEDIA_DEEPEST 32
@@ -165,7 +211,17 @@ void media_crossings(vec3 origin, vec3 direction)
     crossings.t[i] = 1e30;
     crossings.medium[i] = 0;
   }
-#ifdef MEDIA_BOUNDED
+#if defined(MEDIA_BOXES)
+  for (int k = FIRST_BOX; k < FIRST_BOX + MEDIA_BOXES; k++) {
+    vec2 met = media_box(k, origin, direction);
+    if (met.y > max(met.x, 0.0)) {
+      if (met.x > 0.0) {
+        crossings_insert(met.x, k + 1);
+      }
+      crossings_insert(met.y, -(k + 1));
+    }
+  }
+#elif defined(MEDIA_BOUNDED)
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
   int pending[MEDIA_DEEPEST];
   uint bits[MEDIA_DEEPEST];
@@ -217,8 +273,7 @@ uint media_at_start()
   }
   inside |= crossings.dropped & ~seen;
 #ifdef MEDIA_APART
-  vec4 listed = media_table_fetch(ivec2(2046 - media_ray, 0));
-  media_seen = uint(listed.x) | (uint(listed.y) << 15u);
+  media_see();
   inside &= media_seen;
 #endif
   return inside;

@@ -7,7 +7,8 @@
 // that walks go on over surfaces alone. Each asks one row of lights, drawn evenly. At each stop it looks once
 // for a place in media that the row lights: drawn along rays of the lamp (media/from_lamps.glsl) or by the phase function or
 // cosine and around the lamp, weighted by the balance heuristic. Then it goes on by phase function or cosine, to a place in
-// media drawn by what they let pass, or to a surface, where the row is asked.
+// media drawn by what they let pass, or to a surface, where the row is asked. STRAIGHT_ALONE: `out_found` is what comes
+// straight from media that shine, and no lights are asked.
 #include "lib/gbuffer.glsl"
 #include "media/arriving.glsl"
 #include "media/from_lamps.glsl"
@@ -16,7 +17,7 @@
 #include "media/froxels.glsl"
 #endif
 
-#ifdef ONE_SCATTER
+#if defined(ONE_SCATTER) || defined(STRAIGHT_ALONE)
 #define SCATTERS_ON false
 #else
 #define SCATTERS_ON true
@@ -146,7 +147,11 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
   LampRays rays = lamp_rays(number, ask_turn);
   bool lit_exists = false;
   vec3 lit = vec3(0.0);  // the surface where a ray of the lamp ends
+#ifdef STRAIGHT_ALONE
+  int task = GO_ON;
+#else
   int task = (SCATTERS_ON && rays.shadow) ? FIND_LIT : LOOK;
+#endif
   int scattered_times = 0;
   int bounce = 0;
   for (int i = 0; i < 3 * bounces + 1 && bounce < bounces; i++) {
@@ -215,6 +220,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       vec3 shines = found_aim ? vec3(0.0) : passed / (lobe * (1.0 - aimed)) * bins.emitted;
       straight += (bounce == 0) ? shines : vec3(0.0);
       sum += (bounce == 0) ? vec3(0.0) : shines;
+#ifdef STRAIGHT_ALONE
+      break;
+#endif
       if (!scattered && (found_aim || !at_surface)) {
         break;
       }
@@ -365,7 +373,7 @@ Start on_ray(ViewRay ray, int number, vec2 ask_turn, float v, inout uint seed)
 void main()
 {
   out_found = vec4(0.0);
-#ifdef SHINING
+#if defined(SHINING) && !defined(STRAIGHT_ALONE)
   out_straight = vec4(0.0);
 #endif
   ivec2 size = surface_position_size();
@@ -416,7 +424,11 @@ void main()
     int turn = film_view.sample_index * walks + which;
     uvec2 moved = salt.xy + uint(which) * 0x9E3779B1u;
     vec2 u = vec2(scrambled(film_view.bits_x, moved.x), scrambled(film_view.bits_y, moved.y));
+#ifdef STRAIGHT_ALONE
+    int number = -1;
+#else
     int number = draw_row(shuffled(turn, salt.zx));
+#endif
     vec2 ask_turn = vec2(media_random(seed), media_random(seed));
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
     Start start = on_ray(ray, number, ask_turn, shuffled(turn, salt.yz), seed);
@@ -432,8 +444,11 @@ void main()
       straight_sum += finite_sum(straight);
     }
   }
+#ifdef STRAIGHT_ALONE
+  sum = straight_sum;
+#endif
   out_found.rgb = sum / float(walks);
-#ifdef SHINING
+#if defined(SHINING) && !defined(STRAIGHT_ALONE)
   out_straight = vec4(straight_sum / float(walks), out_found.w);
 #endif
 }

@@ -3,12 +3,11 @@
 // `media_table` (addon/scene/media.py) holds MEDIUM_TEXELS per medium; what varies stands on grids of cells, of one layout in
 // three images: extinction with anisotropy (above the table, in its image), scattering, emission. A grid is read at one cell, drawn around the point with
 // the weights of trilinear interpolation: a mean over samples is the interpolated value for an eighth of the fetches.
-// MEDIA_WORLD, MEDIA_BOUNDED, MEDIA_GRIDS say which kinds of media there are; others are not compiled.
+// MEDIA_WORLD, MEDIA_BOUNDED, MEDIA_BOXES, MEDIA_GRIDS, MEDIA_ONE_LOBE say which kinds of media there are; others are not compiled.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "media/boundary.glsl"
 
-#define MEDIUM_TEXELS 10
 #define MARCH_STEPS 192      // at most, of a ray through one medium's grid
 #define FARTHEST_MEDIUM 1e29
 
@@ -143,7 +142,26 @@ vec3 media_transmittance_known(vec3 origin, vec3 direction, float limit, uint sa
   uint seed = salt;
   media_turn_by(seed);
 #endif
-#ifdef MEDIA_BOUNDED
+#if defined(MEDIA_BOXES)
+  // Depths of media add up, in whichever order they come.
+#ifdef MEDIA_APART
+  media_see();
+#endif
+#ifdef MEDIA_WORLD
+  depth = media_depth(1u, origin, direction, 0.0, limit);
+#endif
+  for (int k = FIRST_BOX; k < FIRST_BOX + MEDIA_BOXES; k++) {
+    vec2 met = media_box(k, origin, direction);
+    float from = max(met.x, 0.0);
+    float to = min(met.y, limit);
+#ifdef MEDIA_APART
+    to = ((media_seen >> uint(k) & 1u) != 0u) ? to : from;
+#endif
+    if (to > from) {
+      depth += media_depth(1u << uint(k), origin, direction, from, to);
+    }
+  }
+#elif defined(MEDIA_BOUNDED)
   uint inside = media_at_start();
   float from = 0.0;
   for (int i = 0; i < media_intervals() && from < limit; i++) {
@@ -161,7 +179,7 @@ vec3 media_transmittance_known(vec3 origin, vec3 direction, float limit, uint sa
 // The same of any ray of the kind that was asked about last.
 vec3 media_transmittance_asked(vec3 origin, vec3 direction, float limit, uint salt)
 {
-#ifdef MEDIA_BOUNDED
+#if defined(MEDIA_BOUNDED) && !defined(MEDIA_BOXES)
   media_crossings(origin, direction);
 #endif
   return media_transmittance_known(origin, direction, limit, salt);

@@ -3,6 +3,7 @@
 //
 // Henyey & Greenstein 1941; Rayleigh 1871; Draine 2003; Fournier & Forand 1994 with its parameters from the share that is
 // scattered backwards; Mie scattering of droplets as a mix of the first and the third (Jendersie & d'Eon 2023).
+// MEDIA_ONE_LOBE: all media of the scene scatter by the first one.
 #include "lib/math.glsl"
 
 #define PHASE_HENYEY_GREENSTEIN 0
@@ -41,6 +42,7 @@ float phase_fournier_forand(vec3 values, float mu)
 
 float phase_value(int kind, float g, vec4 values, float mu)
 {
+#ifndef MEDIA_ONE_LOBE
   if (kind == PHASE_RAYLEIGH) {
     return 3.0 / (16.0 * PI) * (1.0 + mu * mu);
   }
@@ -53,12 +55,16 @@ float phase_value(int kind, float g, vec4 values, float mu)
   if (kind == PHASE_MIE) {
     return mix(phase_henyey_greenstein(values.x, mu), phase_draine(values.y, values.z, mu), values.w);
   }
+#endif
   return phase_henyey_greenstein(g, mu);
 }
 
 // Anisotropy of the lobe of Henyey & Greenstein by which directions of a phase function are drawn.
 float phase_lobe(int kind, float g, vec4 values)
 {
+#ifdef MEDIA_ONE_LOBE
+  return g;
+#endif
   if (kind == PHASE_RAYLEIGH) {
     return 0.0;
   }

@@ -7,7 +7,7 @@
 #include "media/view_ray.glsl"
 
 #define REACH 2.0
-#define MOST_TIMES 8.0  // what is known around: more is a guide that has missed it there, at the rim of a cloud
+#define MOST_TIMES 8.0  // what is known around, for as much as there is of media: more is a guide that has missed it there, at the rim of a cloud
 
 float overlap(float place, float middle)
 {
@@ -53,7 +53,7 @@ void main()
       vec3 trust = weight / max(there + here, vec3(1e-20));
       guided += trust * found.rgb;
       guides += trust * there;
-      most = max(most, (weight > 0.0) ? abs(found.rgb) : vec3(0.0));
+      most = max(most, (weight > 0.0) ? abs(found.rgb) * min(opacity / max(second.w, 1e-6), 1.0) : vec3(0.0));
       total += weight;
     }
   }

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from addon.gfx import images, passes
+from addon.lighting.media import MediaService
 from addon.materials.volume import PHASES, Medium
-from addon.scene.media import phase_values
+from addon.scene.media import BOX, CORNERS, Filled, box_rows, phase_values
 from addon.snapshot.volumes import openvdb
 from addon.ui.properties import settings_of
 from tests.techniques.foggy_stage import absorber, box, fill, fog, glowing_floor, volume
@@ -47,6 +48,52 @@ def test_nested_and_overlapping_media_add_their_coefficients(stage):
     box(stage, absorber(stage, (0.0, 0.4, 0.0)), (-0.5, -0.5, 0.0), (0.5, 0.5, 1.5))  # half out of it
     seen = stage.render(size=(16, 16))["combined"][8, 8, :3]
     assert seen == pytest.approx(2 * np.exp(-np.array([0.6 + 0.5, 0.6 + 0.4 * 1.5, 0.6])), rel=1e-3)
+
+
+def test_boxes_are_told_from_other_boundaries():
+    medium = Medium(np.zeros(3), np.ones(3), np.zeros(3), 0.0, 0.0, 0.0, True)
+    place = np.array([[0, 2.0, 0, 3], [-1, 0, 0.5, 1], [0, 0, 4, 0]], float)  # sheared and turned
+    corners = (CORNERS @ place[:, :3].T + place[:, 3])[BOX]
+
+    def rows(corners):
+        return box_rows(Filled(medium, None, corners, place, place, "box"))
+
+    assert rows(corners) @ (*place[:, 3], 1) == pytest.approx(np.zeros(3), abs=1e-9)
+    halved = np.concatenate([corners[1:], [[corners[0, 0], corners[0, 1], corners[0, 1:].mean(axis=0)]]])
+    for other in (corners[:, ::-1], corners[1:], halved, corners + np.eye(3)[0] * 0.1):
+        assert rows(other) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("others", [(), ((-0.2, -0.9, -0.9), (0.9, 0.3, 0.4))])
+def test_boxes_of_fog_are_as_other_meshes_of_their_shape_are(stage, others):
+    """Turned boxes, which programs meet by their planes, and the same meshes with turned vertices, met by a tree."""
+    stage.camera_above()
+    stage.light("SPOT", (1, 0, 4), (0, 0.25, 0), energy=300, spot_size=1.0, shadow_soft_size=0.0)
+    stage.floor()
+    scattering = volume(stage, Density=0.5, Color=(0.9, 0.8, 0.6, 1), Anisotropy=0.3)
+    boxes = [box(stage, scattering, (-0.9, -0.6, -0.8), (0.7, 0.8, 0.9))]
+    boxes += [box(stage, absorber(stage, (0.2, 0.4, 0.6)), *others)] if others else []
+    for one in boxes:
+        one.rotation_euler = (0.3, 0.4, 0.7)
+        one.scale = (1.0, -1.0, 1.2)
+    names = ("combined", "volume_direct")
+    seen = stage.render(size=(16, 16), samples=2)
+    assert (
+        stage.renderer.frame.service(MediaService)
+        .media.textures["media_table"]
+        .defines.count(("MEDIA_BOXES", str(len(boxes))))
+    )
+    for one in boxes:
+        bpy.context.view_layer.update()
+        one.data.transform(one.matrix_world)
+        one.data.flip_normals()  # it was mirrored
+        one.rotation_euler, one.scale = (0, 0, 0), (1, 1, 1)
+    turned = stage.render(size=(16, 16), samples=2)
+    assert "MEDIA_BOXES" not in dict(stage.renderer.frame.service(MediaService).media.textures["media_table"].defines)
+    for name in names:
+        assert turned[name][..., :3].mean() == pytest.approx(seen[name][..., :3].mean(), rel=2e-3)
+        assert np.median(np.abs(turned[name] - seen[name])) < 1e-4 * seen[name].mean()
 
 
 def test_fog_takes_light_on_both_legs_of_its_way(stage):
@@ -125,6 +172,24 @@ def test_a_medium_shines_as_the_integral_of_what_it_emits(stage):
     box(stage, made, (-1, -1, -1), (1, 1, 1))
     seen = stage.render(size=(16, 16))["emission"][8, 8, :3]
     assert seen == pytest.approx(np.array([3, 2, 1]) / 0.5 * (1 - np.exp(-1.0)), rel=1e-3)
+
+
+def test_media_scatter_once_what_they_shine_on_themselves(stage):
+    """A thin box that shines and scatters, without bounces of volumes: from its middle, evenly in all directions."""
+    stage.camera((0, 0, 6), (0, 0, 0), angle=0.02)
+    stage.scene.cycles.volume_bounces = 0
+    scattered, sent = 0.02, 3.0
+    made = volume(stage, "ShaderNodeVolumeCoefficients", Absorption_Coefficients=(0, 0, 0),
+                  Scatter_Coefficients=(scattered,) * 3, Emission_Coefficients=(sent,) * 3)  # fmt: skip
+    box(stage, made)
+    seen = stage.render(size=(8, 8), samples=16, bounces=1)["volume_direct"][..., :3].mean()
+    z = np.linspace(-0.5, 0.5, 22)[1:-1, None]
+    golden = np.arange(4000) + 0.5
+    height, turn = 1 - golden / 2000, golden * np.pi * (1 + 5**0.5)
+    across = np.sqrt(1 - height**2)
+    far = np.minimum(0.5 / np.abs(across * np.cos(turn)), 0.5 / np.abs(across * np.sin(turn)))
+    far = np.minimum(far, np.where(height > 0, 0.5 - z, 0.5 + z) / np.abs(height))
+    assert seen == pytest.approx(scattered * sent * far.mean(), rel=0.05)
 
 
 @pytest.mark.slow
