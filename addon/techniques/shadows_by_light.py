@@ -4,6 +4,7 @@
 |---|---|---|
 | without extent | plain | nothing to filter |
 | widest penumbra below one texel of a plain map | plain | filtered or not, the map shows the same |
+| round and nearer than four radii, or a spot whose size blurs its cone's edge; rays | plain | see below |
 | few silhouette edges before each pixel | edges (depth_complexity.py) | less than equal rays or maps cost |
 | the `important` strongest of the others | variance (vssm.py) | the least error of one map |
 | all others | convolution (cssm.py) with 2 x 2 boxes and one contact ray | a lookup that costs less |
@@ -17,15 +18,14 @@ What edges cost is known for this device and this picture (lighting/edge_costs.p
 Auto takes this technique for pictures of one sample in which a light has extent and casts shadows. With more samples
 points of the lights (accumulated_maps.py) converge, and which is better is left to what the benchmark measured. Drafts
 of a moving view keep points too: their maps are drawn in half the time.
+As a whole, a light has one cone and one distance: a spot's cone would stay sharp that its size blurs, and penumbrae of
+a large round light near by are others. Where rays cost no more than maps, points take them (`bench auto`, one sample:
+stairs .049 to .021, ball .033 to .017).
 
-Few lights have soft maps of at least 512 texels a side. Each kind keeps its own parameters. Cost and bias (direct
-diffuse and glossy light) are those of the kinds; lights of one kind share atlas and pass.
+Few lights have soft maps of at least 512 texels a side. Cost and bias are those of the kinds; each shares one atlas.
 
 Measured with one sample at 128x96 against Cycles, relMSE of the direct diffuse light, by this technique and by points
-with the same 6 maps per sample: Cornell box 0.036 and 0.059, door ajar 0.066 and 0.63, garden 0.19 and 0.24, window
-0.54 and 0.57, instances 0.60 and 0.64, foliage 0.31 and 0.33; colonnade 2.2 and 1.9. All figures include the film's
-filter, and are from before one sample showed several points of it (film/points.py). Round lights, whose points are
-asked by rays where they are near, are no exception: with rays to them the garden has 0.20.
+with 6 maps per sample: Cornell box 0.036 and 0.059, door ajar 0.066 and 0.63, garden 0.19 and 0.24; colonnade 2.2, 1.9.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
-from ..lighting import edge_costs
+from ..lighting import edge_costs, edge_tiles
 from ..lighting.caustic_casters import answered
 from ..lighting.edge_costs import FEW_EDGES
+from ..lighting.edge_shadows import NEAR
 from ..lighting.loop import tinted_casters
 from ..lighting.point_maps import PointMaps
 from ..lighting.silhouettes import Extent
@@ -55,6 +56,7 @@ EDGES = "soft lights with few edges: depth complexity"
 VARIANCE, CONVOLUTION = "important soft lights: variance maps", "other soft lights: convolution maps"
 
 
+BLURRED = 0.5  # of the width of a spot's blend, from which on what its size adds to it is seen
 # Of soft maps, texels, where few lights have some: in small pictures a finer map costs little beside its lookups.
 LEAST_SIDE, FEW_LIGHTS = 512, 4
 
@@ -129,7 +131,8 @@ class ShadowsByLight(PointMaps):
             return {}
         kinds, soft = {}, []
         for emitter in emitters:
-            if penumbra(frame, emitter) * self._providers[PLAIN].resolution(frame) < 1.0:
+            sharp = penumbra(frame, emitter) * self._providers[PLAIN].resolution(frame) < 1.0
+            if sharp or self._is_seen_in_parts(frame, emitter):
                 kinds[emitter.light.key] = PLAIN
             else:
                 soft.append(emitter)
@@ -143,6 +146,21 @@ class ShadowsByLight(PointMaps):
         most = frame.settings.get(self, "important")
         kinds |= {emitter.light.key: VARIANCE for emitter in soft[:most]}
         return kinds | {emitter.light.key: CONVOLUTION for emitter in soft[most:]}
+
+    def _is_seen_in_parts(self, frame: Frame, emitter: lights.Emitter) -> bool:
+        """Whether the light, taken as a whole, would err more than one point of it does, which rays can ask for."""
+        near = emitter.kind in (lights.POINT, lights.SPHERE) and (
+            emitter.radius > NEAR * edge_tiles.nearest_receiver(frame, emitter)
+        )
+        plain = self._providers[PLAIN]
+        if frame.settings.samples > 1 or not (near or blurs_its_cone(frame, emitter)):
+            return False
+        plain.begin(frame)
+        traced = plain.traces(frame, emitter)
+        if traced:
+            why = "it is near, round and large" if near else "its size blurs the edge of its cone"
+            frame.account.chose(self, emitter.light.name, f"rays to its points, because {why}")
+        return traced
 
     def _may_have_edges(self, frame: Frame) -> bool:
         """Whether it is worth to find silhouettes: one sample, and few triangles."""
@@ -187,6 +205,22 @@ class ShadowsByLight(PointMaps):
         self._kinds = {}
 
 
+def blurs_its_cone(frame: Frame, emitter: lights.Emitter) -> bool:
+    """Whether the edge of a spot's cone is blurred by its size about as much as by its own blend."""
+    light = emitter.light
+    if light.kind != "SPOT" or not emitter.radius:
+        return False
+    half = np.clip(light.spot_angle, 1e-3, np.pi - 1e-3) / 2
+    blend = (1.0 - np.cos(half)) * light.spot_blend / np.sin(half)
+    return 2.0 * emitter.radius / max(float(np.median(distances(frame, emitter))), 1e-9) > BLURRED * blend
+
+
+def distances(frame: Frame, emitter: lights.Emitter) -> np.ndarray:
+    """From a light to the nearest receiver of each of the picture's tiles, m."""
+    nearest = np.clip(emitter.centre, frame.receivers.low, frame.receivers.high)
+    return np.linalg.norm(nearest - emitter.centre, axis=1)
+
+
 def penumbra(frame: Frame, emitter: lights.Emitter) -> float:
     """Bound of the widest penumbra, as a share of what the picture's receivers span; 0 for a light without extent."""
     if not emitter.extended:
@@ -195,8 +229,7 @@ def penumbra(frame: Frame, emitter: lights.Emitter) -> float:
     span = max(float((receivers.high.max(axis=0) - receivers.low.min(axis=0)).max()), 1e-6 * size)
     if emitter.kind == lights.SUN:
         return 2.0 * np.tan(min(emitter.radius, 1.5)) * size / span
-    nearest = np.clip(emitter.centre, receivers.low, receivers.high)
-    distance = max(float(np.linalg.norm(nearest - emitter.centre, axis=1).min()), 1e-6 * size)
+    distance = max(float(distances(frame, emitter).min()), 1e-6 * size)
     return 2.0 * emitter.reach / distance * min(distance, size) / span
 
 

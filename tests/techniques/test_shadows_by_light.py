@@ -18,7 +18,10 @@ SOFT = ("AREA", {"size": 1.0})
 KINDS = {
     "a point": ("POINT", {"shadow_soft_size": 0.0}, by_light.PLAIN),
     "a sun of a hundredth of a degree": ("SUN", {"angle": 2e-4}, by_light.PLAIN),
-    "a sphere at arm's length": ("POINT", {"shadow_soft_size": 0.8}, by_light.VARIANCE),
+    "a sphere at arm's length": ("POINT", {"shadow_soft_size": 0.8}, by_light.PLAIN),
+    "a small sphere": ("POINT", {"shadow_soft_size": 0.3}, by_light.VARIANCE),
+    "a spot whose size blurs its cone": ("SPOT", {"shadow_soft_size": 0.2, "spot_blend": 0.1}, by_light.PLAIN),
+    "a wide blend": ("SPOT", {"shadow_soft_size": 0.1, "spot_size": 1.2, "spot_blend": 1.0}, by_light.VARIANCE),
     "a square": (*SOFT, by_light.VARIANCE),
     "a hazy sun": ("SUN", {"angle": 0.1}, by_light.VARIANCE),
 }  # fmt: skip
