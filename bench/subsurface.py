@@ -22,7 +22,7 @@ import numpy as np
 
 from . import markdown
 from .quick import size_of, table
-from .shading import even_world, node_of
+from .shading import even_world, node_of, one_shader
 
 METHODS = ("BURLEY", "RANDOM_WALK_SKIN", "RANDOM_WALK")
 # Radii of the random walk are mean free paths, a twelfth of what looks alike with the others.
@@ -289,6 +289,49 @@ def bust(method: str) -> None:
     camera((0, -4, 0), (np.pi / 2, 0, 0), 0.75)
 
 
+def hair_on_skin(method: str) -> None:
+    """Strands above a ball of skin, lit from the side."""
+    import bpy
+
+    _ball(material(method, *SKIN, 1.0), (0, 0, 0), 1.0)
+    k = np.arange(400)
+    height, turn = 1.0 - (k + 0.5) / 400, 2.399963 * k
+    out = np.stack([np.sqrt(1 - height**2) * np.cos(turn), np.sqrt(1 - height**2) * np.sin(turn), height], axis=1)
+    points = out[:, None] * np.array([0.98, 1.15, 1.3])[:, None] - np.array([0.0, 0.02, 0.08])[:, None] * [0, 0, 1]
+    curves = bpy.data.hair_curves.new("Hair")
+    curves.add_curves([3] * len(points))
+    curves.attributes["position"].data.foreach_set("vector", np.ravel(points))
+    radii = curves.attributes.get("radius") or curves.attributes.new("radius", "FLOAT", "POINT")
+    radii.data.foreach_set("value", [0.012] * len(radii.data))
+    curves.materials.append(one_shader("Strands", "ShaderNodeBsdfDiffuse", Color=(0.1, 0.06, 0.03, 1)))
+    _link("Hair", curves)
+    light("AREA", (3, -2, 3), (0.9, 0, 0.98), energy=300, size=0.5)
+    light("AREA", (-1, 3, 1), (1.25, 0, 3.46), energy=200, size=1.0)
+    camera((0, -4.5, 0.6), (np.pi / 2 - 0.13, 0, 0))
+
+
+def linked_lamps(method: str) -> None:
+    """A lamp from behind that lights the right one of two blocks alone, and one whose shadow a board does not throw."""
+    import bpy
+
+    shown = material(method, *WAX, 2.0)
+    blocks = [
+        _shape(bpy.ops.mesh.primitive_cube_add, shown, False, size=0.9, location=(x, 0, 0), rotation=(0.2, 0.1, 0.5))
+        for x in (-0.7, 0.7)
+    ]
+    board = _shape(bpy.ops.mesh.primitive_cube_add, bpy.data.materials.new("Board"), False, location=(0, -1.5, 1.5))
+    board.scale, board.visible_camera = (2.0, 0.5, 0.02), False
+    behind = light("AREA", (0.5, 2.5, 1), (1.19, 0, 2.94), energy=150, size=1.0)
+    above = light("AREA", (0, -3, 3), (0.785, 0, 0), energy=60, size=0.5)
+    lit, blockers = bpy.data.collections.new("Lit"), bpy.data.collections.new("Blockers")
+    lit.objects.link(blocks[1])
+    for one in blocks:
+        blockers.objects.link(one)
+    behind.light_linking.receiver_collection = lit
+    above.light_linking.blocker_collection = blockers
+    camera((0, -4, 0), (np.pi / 2, 0, 0))
+
+
 def _radius(share: float) -> Callable[[str], None]:
     """A ball lit from the side whose radius of scattering is this share of its own."""
 
@@ -308,6 +351,7 @@ SCENES: dict[str, Callable[[str], None]] = {
 THROUGH: dict[str, Callable[[str], None]] = {
     "ears": ears, "wax block": block, "grapes": grapes, "hollow candle": hollow_candle,
     "thin leaf": leaf, "cloth": cloth, "cloth, flipped": cloth_flipped, "marble bust": bust, "milk": milk,
+    "hair on skin": hair_on_skin, "linked lamps": linked_lamps,
     **{f"radius {share:g}": _radius(share) for share in (0.1, 0.5, 1.0, 2.0)},
 }  # fmt: skip
 
@@ -316,7 +360,7 @@ def clear() -> None:
     import bpy
 
     bpy.data.batch_remove([*bpy.data.objects, *bpy.data.meshes, *bpy.data.lights, *bpy.data.cameras])
-    bpy.data.batch_remove([*bpy.data.materials, *bpy.data.worlds])
+    bpy.data.batch_remove([*bpy.data.materials, *bpy.data.worlds, *bpy.data.hair_curves, *bpy.data.collections])
 
 
 _eevee: dict[tuple, tuple[np.ndarray, float]] = {}  # by scene and size: it knows no methods

@@ -7,7 +7,7 @@ has several, so that a picture of one sample is smooth.
 | cost | per sample |
 |---|---|
 | rays | a point: one for each point of a light source |
-| passes | 1 over the points for each 64 points of light sources |
+| passes | 1 over the points for each 64 points of light sources; lamps that other objects block are asked apart |
 """
 
 from __future__ import annotations
@@ -70,8 +70,13 @@ class PointLight:
         SURFACE_IMAGES) to the two images of `target`. `instances`: of which instance each point is (z: its row in the
         geometry's image), for lights that leave out objects. Returns the numbers of passes and of rays a point."""
         number = frame.sample if number is None else number
-        rows = [*self._lamps(frame, number), *self._world(frame, number), *self._emitted(frame, number)]
-        textures, constants = ray_bindings(frame)
+        by_blockers: dict[frozenset[int], list[np.ndarray]] = {}  # that let light pass
+        for passing, row in self._lamps(frame, number):
+            by_blockers.setdefault(passing, []).append(row)
+        others = [*self._world(frame, number), *self._emitted(frame, number)]
+        by_blockers[frozenset()] = by_blockers.get(frozenset(), []) + others
+        rows = [row for some in by_blockers.values() for row in some]
+        drawn = 0
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
         program = dimmed(frame, LIGHTING, bound)
         with ExitStack() as stack:
@@ -80,22 +85,26 @@ class PointLight:
                 linked.find_groups(frame, instances, groups)
                 program = answered(program, (linked.LINKS,))
                 bound["receiver_groups"] = groups.colors[0]
-            for first in range(0, len(rows), lights.MOST_LIGHTS):
-                some = rows[first : first + lights.MOST_LIGHTS]
-                passes.fullscreen(
-                    program, target, blend="ADDITIVE_PREMULT",
-                    textures={**bound, **textures, "energy_table": frame.materials.energy_table},
-                    blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
-                    constants={"light_count": len(some), "traced_roughness": -1.0, **constants},
-                )  # fmt: skip
-        return -(-len(rows) // lights.MOST_LIGHTS), len(rows)
+            for passing, of_those in by_blockers.items():
+                textures, constants = ray_bindings(frame, passing)
+                for first in range(0, len(of_those), lights.MOST_LIGHTS):
+                    some = of_those[first : first + lights.MOST_LIGHTS]
+                    passes.fullscreen(
+                        program, target, blend="ADDITIVE_PREMULT",
+                        textures={**bound, **textures, "energy_table": frame.materials.energy_table},
+                        blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
+                        constants={"light_count": len(some), "traced_roughness": -1.0, **constants},
+                    )  # fmt: skip
+                    drawn += 1
+        return drawn, len(rows)
 
     def _points(self, frame: Frame, least: int) -> int:
         """On a source in a sample."""
         return max(self._few // frame.settings.samples, least) if self._each is None else self._each
 
-    def _lamps(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
-        """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power."""
+    def _lamps(self, frame: Frame, sample_number: int) -> Iterator[tuple[frozenset[int], np.ndarray]]:
+        """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power. With each the
+        groups of blockers that let its light pass."""
         settings = frame.settings
         emitters = [
             one
@@ -119,7 +128,7 @@ class PointLight:
                 shadowed = int(emitter.light.cast_shadow)
                 row = emitter.row(sample, 0, shadowed, weight, each, points)
                 row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
-                yield row
+                yield emitter.light.links.passing, row
 
     def _world(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
         world = frame.snapshot.world

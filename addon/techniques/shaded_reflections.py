@@ -190,7 +190,7 @@ class ShadedReflections(Technique, BothWays):
         Param(
             "bounces", "Mirror bounces", 8,
             "Number of consecutive mirror reflections that are shaded; 0: reflections show mean colours",
-            0, 16, draft=0,
+            0, 64, draft=0,
         ),
         Param(
             "roughness", "Roughness", 0.6,
