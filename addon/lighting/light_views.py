@@ -273,13 +273,14 @@ class LightBuffers:
         self._viewed(frame, view)
         everything = frozenset(range(len(frame.materials.compiled)))
         bound = {f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, target.colors)}
+        target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+        hiding = {"transparent_mode": STOCHASTIC, "glass_bends": 1, "index_shown": -1}
+        draw_view(
+            frame, technique, target, self._block, view.rows, frame.materials.surface_program,
+            everything - materials, hiding,
+        )  # fmt: skip
         for lobe in lobes:
-            target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-            hiding = {"transparent_mode": STOCHASTIC, "glass_bends": 1, "index_shown": -1}
-            draw_view(
-                frame, technique, target, self._block, view.rows, frame.materials.surface_program,
-                everything - materials, hiding,
-            )  # fmt: skip
+            # Depths stay from lobe to lobe: what is nearest is the same in all.
             images.Target(target.colors).clear()
             constants = {
                 "transparent_mode": STOCHASTIC, "glass_bends": 1, "index_shown": -1, "wanted_lobe": lobe,
