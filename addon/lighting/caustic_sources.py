@@ -19,6 +19,7 @@ class MeshSource:
     """All emissive meshes, as one light. A sample of it are the numbers that a point is drawn by."""
 
     light, has_span, flags, kind, key = None, False, 0, lights.SURFACE, MESHES
+    is_flat = True
 
     def __init__(self, triangles: EmissiveTriangles, samples: float):
         self._triangles, self._samples = triangles, samples
@@ -42,6 +43,7 @@ class WorldSource:
     """Directions of the world's bright part, as suns without extent."""
 
     light, has_span, flags, kind, key = None, False, 0, lights.SUN, WORLD
+    is_flat = True
 
     def __init__(self, bright):
         self._bright = bright
