@@ -36,7 +36,7 @@ from ..scene.culling import closed
 from ..scene.materials import CAMERA_DEFINES, SURFACE_IMAGES
 from ..scene.view import VIEW
 from ..snapshot.panorama import bends_lines
-from ..snapshot.scene import Instance, Mesh, Snapshot
+from ..snapshot.scene import Instance, Mesh, Note, Snapshot
 from ..surfaces import geodesic, reflection_edits
 from ..surfaces.draw import SURFACE_TEXTURES, SurfaceStages
 from ..surfaces.edits_at_hits import EditedObject, EditsAtHits
@@ -173,8 +173,22 @@ class ReflectionEditing(Technique):
             key = (*where, instance.own, instance.materials, _indices(frame, instance))
             kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, surfaces[where])
         self._kept, self._edited, self._surfaces = kept, list(kept.values()), surfaces
+        frame.ledger.notes = (*frame.ledger.notes, *self._unfrozen(frame))
         frame.shared(SurfaceStages).apply.append(self._at_film_point)
         frame.provide(EditsAtHits([one.at_hits for one in self._edited]))
+
+    def _unfrozen(self, frame: Frame) -> list[Note]:
+        """What Freeze does not keep: where light leaves closed glass follows from the view through it."""
+        solids = [one.at_hits.instance for one in self._edited if one.at_hits.outward]
+        text = (
+            "Freeze Reflections keeps what the glass mirrors, not what is seen through it, which is edited as in the "
+            "view of now. Render from where the constraint was made (Return to View) for the picture that was meant."
+        )
+        return [
+            Note(f"Object '{one.object_name}'", text) for one in solids
+            if own_value(one.own, ReflectionEditing, "freeze")
+            and any(frame.materials.compiled[slot].glass for slot in one.materials)
+        ]  # fmt: skip
 
     def sample(self, frame: Frame) -> None:
         self._edit(frame, {name: frame.images[f"surface.{name}"] for name in SURFACE_IMAGES}, EDIT)

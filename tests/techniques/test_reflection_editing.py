@@ -616,6 +616,18 @@ def test_a_glass_ball_shows_a_target_where_its_constraint_lies(stage):
     assert np.abs(shown - expected).max() < 0.8
 
 
+def test_what_freeze_does_not_keep_of_glass_is_told(stage):
+    ball = sphere(stage, stage.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0), rings=8)
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
+    stage.world((1, 1, 1), 1.0)
+    constrain(ball, (0, -1, 0), (3, 5, 2), (0, -4, 0))
+    stage.render(1, (16, 12), bounces=1)
+    assert not any("Freeze" in str(note) for note in stage.ledger.notes)
+    ball.candela.reflection_editing_freeze = True
+    stage.render(1, (16, 12), bounces=1)
+    assert any("Freeze" in note.text and ball.name in note.subject for note in stage.ledger.notes)
+
+
 @pytest.mark.parametrize("degrees", [15, 60])
 def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees):
     """Edited rays that point into the ball show what is behind it, not its inside."""
