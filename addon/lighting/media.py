@@ -1,4 +1,4 @@
-"""The service of the media of a scene: what they let pass, for passes that draw light or look along a view.
+"""How fog dims light on its way: what media let pass, for passes that draw light or look along a view.
 
 A pass that asks how much light arrives from somewhere includes ask/media.glsl and is drawn by what `dimmed` makes of
 its program. Without a medium nothing of this is compiled.

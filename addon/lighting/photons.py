@@ -49,7 +49,7 @@ from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
 from .caustic_sources import sources_of
-from .interfaces import most_interfaces, upload_interfaces
+from .glass_interfaces import most_interfaces, upload_interfaces
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
 from .media import dimmed, is_endless
 

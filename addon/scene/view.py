@@ -1,4 +1,4 @@
-"""A camera as what the shaders need: one projection for perspective and orthographic, film offsets, and rays."""
+"""A camera as shaders read it, who make its rays of that: one projection for perspective and orthographic views."""
 
 from __future__ import annotations
 

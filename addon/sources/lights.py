@@ -1,4 +1,4 @@
-"""Lights as rows of the uniform block that shaders/light/sources.glsl reads, and this sample's point on each.
+"""Lights as shaders read them: the record of a light, declared once for both, and this sample's point on each.
 
 Radiance follows Cycles' conventions for every kind. All points inside a light come from the frame's sequence.
 """

@@ -40,7 +40,7 @@ from ..gfx.library import Program
 from ..lighting import caustic_maps
 from ..lighting.caustic_casters import bright_world, meshes_answered
 from ..lighting.caustic_maps import CausticMaps
-from ..lighting.interfaces import clear_roughness
+from ..lighting.glass_interfaces import clear_roughness
 from ..lighting.leaving_light import sending
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import CANDIDATES

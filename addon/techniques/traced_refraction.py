@@ -40,7 +40,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting.interfaces import clear_roughness, upload_interfaces
+from ..lighting.glass_interfaces import clear_roughness, upload_interfaces
 from ..lighting.media import MediaService, dimmed
 from ..lighting.path_sources import SHOWN_THROUGH, PathSources, ShadedLobes
 from ..materials.compiler import may_refract

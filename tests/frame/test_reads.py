@@ -7,7 +7,7 @@ import pytest
 
 from addon.frame.reads import Reads, same
 from addon.frame.run import IN_TREES, NO_LIGHT, lights_key
-from addon.lighting.interfaces import interface_table
+from addon.lighting.glass_interfaces import interface_table
 from addon.snapshot.scene import Light, Links, Visibility
 from tests.frame.test_plan import lamp, room
 
