@@ -1,8 +1,10 @@
 """What a picture asks of the GPU, and Python's own time in it, counted: `python -m bench counted`, which needs no GPU.
 
 Of each scene, at 16x12 pixels and one sample after a move of the camera: readbacks, draws, dispatches, uploads,
-programs bound, framebuffers, and the functions that take the longest themselves. Of several pictures each function's
-least time counts, so that what else the machine does adds little.
+programs bound, framebuffers, files, climbs, and the functions that take the longest themselves. A climb is a file that
+calls one of a room that stands below its own in docs/architecture.md, so that it may not import it: by what was handed
+down. Pairs of files count once; methods of the contract of techniques do not. Of several pictures each function's least
+time counts, so that what else the machine does adds little.
 
 Calls into Blender's GPU module are counted by Python's profiler, framebuffers where `gfx` makes them. Own time is what
 the add-on's functions take themselves, without what they call in numpy, Blender and the driver; Python's is all but the
@@ -14,9 +16,12 @@ from __future__ import annotations
 import argparse
 import cProfile
 import pstats
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from pathlib import Path
 
+from addon.frame.technique import Technique
 from bench.profile import is_blender, is_gpu
 
 DRAWS = ("draw", "draw_instanced", "draw_range")
@@ -33,6 +38,8 @@ class Counts:
     uploads: int  # images made with content, and uniform blocks written
     framebuffers: int
     passes: int  # programs bound: full-screen passes, and materials and views of meshes
+    files: int  # of the add-on that are at work
+    climbs: int
     python_ms: float
     own_ms: float
 
@@ -92,6 +99,8 @@ def of_stats(stats: dict, framebuffers: int) -> Counts:
         name = _name(function)
         calls[name] = calls.get(name, 0) + count
 
+    files, climbs = files_and_climbs(stats)
+
     def gpu_calls(kind: str, method: str) -> int:
         return sum(count for name, count in calls.items() if f"method '{method}'" in name and kind in name)
 
@@ -104,9 +113,35 @@ def of_stats(stats: dict, framebuffers: int) -> Counts:
         uploads=calls.get("gfx/images.py:upload", 0) + gpu_calls("GPUUniformBuf", "update"),
         framebuffers=framebuffers,
         passes=calls.get("gfx/library.py:bind", 0),
+        files=len(files),
+        climbs=len(climbs),
         python_ms=1000 * python,
         own_ms=1000 * own,
     )
+
+
+CONTRACT = frozenset(dir(Technique))
+ROOMS = re.compile(r"^    addon/(\w+)/ ", re.MULTILINE)
+
+
+def files_and_climbs(stats: dict) -> tuple[set[str], set[tuple[str, str]]]:
+    """Files of the add-on that are at work, and pairs of them of which the first calls the second, above it."""
+    rooms = ROOMS.findall((Path(__file__).parents[1] / "docs" / "architecture.md").read_text(encoding="utf-8"))
+
+    def level(file: str) -> int:
+        room = file.partition("/")[0]
+        return rooms.index(room) if room in rooms else len(rooms)
+
+    files, climbs = set(), set()
+    for function, (*_, callers) in stats.items():
+        if _is_own(function):
+            called = _name(function).partition(":")[0]
+            files.add(called)
+            for caller in filter(_is_own, callers):
+                calling = _name(caller).partition(":")[0]
+                if level(calling) < level(called) and function[2] not in CONTRACT:
+                    climbs.add((calling, called))
+    return files, climbs
 
 
 class _Watched:
@@ -134,6 +169,7 @@ PICTURES, BEFORE = 8, 4  # that are profiled, and drawn before
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenes", nargs="*", default=list(COUNTED), metavar="SCENE", help="of sample_blends")
     parser.add_argument("--top", type=int, default=0, metavar="N", help="list the N functions that take the longest")
+    parser.add_argument("--climbs", action="store_true", help="list them")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -161,6 +197,9 @@ def command(options: argparse.Namespace) -> int:
             figures = ", ".join(f"{field.name} {getattr(counts, field.name)}" for field in fields(Counts)[:-2])
             times = f"Python {counts.python_ms:.1f} ms, its own {counts.own_ms:.1f}"
             print(f"{name}: {figures}; {times}", file=terminal, flush=True)
+            if options.climbs:
+                found = files_and_climbs(_profiled(moved)[0])[1]
+                print("".join(f"  {low} calls {high}\n" for low, high in sorted(found)), end="", file=terminal)
             for milliseconds, calls, function in functions[: options.top]:
                 print(f"  {milliseconds:7.2f} ms {calls:6}  {function}", file=terminal, flush=True)
     return 0
