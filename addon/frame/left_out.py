@@ -25,6 +25,7 @@ BRINGS = {
     "temporal_glare": "the glare of the eye",
 }
 
+COLOURED = ("instant_radiosity", "multires_radiosity", "clustered_visibility")  # whose rays take colours of layers
 NO_GRASS = ("no material", "it is not in the pass tree")  # how reasons begin that nobody need hear
 
 
@@ -37,8 +38,8 @@ def notes_of(
 
 
 def _bounces_past(plan: Plan, tinted: Iterable[CompiledMaterial]) -> Iterator[Note]:
-    """Rays of bounced light pass coloured layers at random, by their mean."""
-    if "indirect" in plan.filled:
+    """Where nothing counts the colours that rays of bounced light pass."""
+    if plan.filled.get("indirect", COLOURED[0]) not in COLOURED:
         for one in tinted:
             text = (
                 "its coloured transparency colours light that comes straight; bounced light passes it as through grey."

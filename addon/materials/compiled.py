@@ -84,6 +84,7 @@ class CompiledMaterial:
     along_normal: bool = False  # displacement is a height along the normal, not a vector
     averaging: frozenset[str] = frozenset()  # those of `images` of which some lookup averages (averages.py)
     own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # where `tinted`: mean colour of what passes, over its luminance
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # about what it reflects, on average: for first looks
 
     @property

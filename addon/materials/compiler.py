@@ -95,6 +95,7 @@ class _Compilation:
             glossy=summary.glossy,
             soft=summary.soft,
             tinted=summary.tinted,
+            tint=_tint_of(passes.mean),
             glows=transparent and emissive,
             added=transparent and self._adds_lobes_to_transparency(),
             glass=summary.glass,
@@ -286,6 +287,14 @@ EMITTERS = {
     "ShaderNodeEmission": ("Strength", "Color"),
     "ShaderNodeBsdfPrincipled": ("Emission Strength", "Emission Color"),
 }
+
+
+def _tint_of(passing: np.ndarray) -> tuple[float, float, float]:
+    """Mean colour of what passes, over the chance of a ray to pass; grey where nothing does."""
+    chance = 1.0 - float(np.clip(1.0 - constant(passing).luminance().mean[0], 0.0, 1.0))
+    if chance <= 1e-4 or not np.isfinite(passing).all():
+        return 1.0, 1.0, 1.0
+    return tuple(float(np.clip(channel / chance, 0.0, 10.0)) for channel in passing)
 
 
 def may_emit(graph: Graph) -> bool:

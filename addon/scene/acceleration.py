@@ -38,6 +38,7 @@ from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
 from .on_gpu import SceneOnGpu
 from .traced_triangles import (
     ALL_RAYS,
+    TINT_CODE,
     is_empty,
     is_met,
     links_code,
@@ -59,6 +60,7 @@ HIERARCHY_TEXTURES = (("RGBA32F", "trace_nodes"), ("RGBA32F", "trace_leaves"))
 LEAF_TEXELS = 17
 # For programs that trace rays among triangles with tiles; others are a tenth faster without.
 TILED = (("OPACITY_TILES", "1"),)
+TINTED, EMISSION_TEXEL = (("TINTED_LAYERS", "1"),), 10  # where some triangle colours light that passes it
 INSTANCED = (("INSTANCED", "1"),)  # and below an upper tree
 NO_TILES = np.zeros((0, 4), np.float32)
 
@@ -178,6 +180,7 @@ class Trees:
         texels = [tiles] * bool(len(tiles)) + [tree.leaves.reshape(-1, 4) for tree in own]
         leaves = images.upload_list(np.concatenate(texels) if len(texels) > 1 else texels[0])
         leaves.defines = (TILED if len(tiles) else ()) + (INSTANCED if len(copies) else ())
+        leaves.defines += TINTED if any((tree.leaves[:, EMISSION_TEXEL] <= -TINT_CODE).any() for tree in own) else ()
         self.upper = UpperTree(copies, np.asarray(origin, float)) if len(copies) else None
         rows = self._joined(copies, starts[1:]) if len(copies) else world.boxes.linked(0, self._first_leaf)
         shared = tuple(

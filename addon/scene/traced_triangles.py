@@ -24,6 +24,7 @@ AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one 
 ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
 MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
 FRONT_ALONE = 0.25  # added to the material's number
+TINT_CODE = 1000.0  # taken from minus the colour of what passes, in the place of what is emitted
 # Above that number stand the groups of light linking, of receivers and of blockers, those beyond the last one as one:
 # all of it, and the quarter, is exact in one float.
 MATERIAL_BITS, GROUP_BITS = 14, 4
@@ -174,10 +175,11 @@ def _refine(
 
 def mean_emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple[float, float, float], float]:
     """Mean radiance that a triangle emits, and what is added to the number of its material where it does so to one side
-    only: FRONT_ALONE or -FRONT_ALONE. Of two sides that both shine the mean stands for either."""
+    only: FRONT_ALONE or -FRONT_ALONE. Of two sides that both shine the mean stands for either. What is dark and colours
+    light that passes has minus its colour over the chance to pass, less TINT_CODE."""
     front, behind = material.emission, material.emission_behind
     if not material.emissive:
-        return (0.0, 0.0, 0.0), 0.0
+        return tuple(-TINT_CODE - channel for channel in material.tint) if material.tinted else (0.0, 0.0, 0.0), 0.0
     if front == behind or (any(front) and any(behind)):
         return tuple((a + b) / 2 for a, b in zip(front, behind)), 0.0
     side = FRONT_ALONE if any(front) else -FRONT_ALONE

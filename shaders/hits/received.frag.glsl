@@ -99,8 +99,9 @@ vec3 direct_light(Receiver r, uint salt)
   float reach = light_reach(light, origin, chosen_direction);
   ivec2 hit;
   bool glass_stops = r.bends || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
-  bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
-                 && trace_layers(origin, chosen_direction, reach, reach, salt, glass_stops, true, hit) < reach;
+  bool looks = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0;
+  bool blocked = looks && trace_layers(origin, chosen_direction, reach, reach, salt, glass_stops, true, hit) < reach;
+  chosen_light *= looks ? layers_color(1e30) : vec3(1.0);
   float through = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
   chosen_light *= blocked ? vec3(0.0) : media_transmittance(origin, chosen_direction, through, salt);
   return blocked ? vec3(0.0) : chosen_light * (total / chosen_share);

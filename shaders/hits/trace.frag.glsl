@@ -42,6 +42,7 @@ void main()
   }
   ivec2 hit;
   float t = trace_layers(start.xyz, direction, 1e29, 0.0, roll.x, glass_bends != 0, false, hit);
+  out_passed.rgb = layers_color(t);
   if (t >= 1e29) {
     return;
   }
@@ -78,7 +79,7 @@ void main()
     int solid = solid_around(start.xyz, direction, offset, roll.x);
     absorbed = (solid >= 0) ? hit_materials_fetch(ivec2(solid & 255, solid >> 8)).rgb : vec3(0.0);
   }
-  out_passed.rgb = exp(-absorbed * t);
+  out_passed.rgb *= exp(-absorbed * t);
 #endif
   out_material = float(material_index);
   gl_FragDepth = shared_depth(material_index);

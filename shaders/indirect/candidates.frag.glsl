@@ -63,7 +63,7 @@ void main()
       break;
     }
     if (bounce > 1) {
-      vec3 passing = passing_media(origin, direction, t, roll.y);
+      vec3 passing = met.passed * passing_media(origin, direction, t, roll.y);
       if (bounce == 2) {
         lobe *= passing;  // the rest where candidates share what they have met (choice_radiance.frag.glsl)
       }

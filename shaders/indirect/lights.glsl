@@ -57,7 +57,9 @@ vec3 virtual_light_arriving(VirtualLight light, vec3 origin, uint salt)
   vec3 path = light.position - origin;
   float reach = length(path);
   vec3 direction = path / max(reach, 1e-30);
-  return light.intensity * virtual_light_seen(light, origin, salt) * passing_media(origin, direction, reach, salt);
+  float seen = virtual_light_seen(light, origin, salt);
+  vec3 colored = seen * layers_color(1e30);
+  return light.intensity * colored * passing_media(origin, direction, reach, salt);
 }
 
 // Irradiance at a surface by virtual lights; `shorter`: by the light in them that may be reflected once more. Every n-th of

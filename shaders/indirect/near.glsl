@@ -34,6 +34,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
         break;
       }
       throughput *= walk.whole ? 1.0 : 1.0 - t * t / (reach * reach);
+      throughput *= walk.met.passed;
       throughput *= passing_media(walk.origin, walk.direction, t, roll.y);
       if (max_component(throughput) <= 1e-4) {
         break;

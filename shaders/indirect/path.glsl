@@ -24,6 +24,7 @@ struct Vertex {
   vec3 turned;
   float upright;
   Reflection reflection;
+  vec3 passed;   // colours of layers before it
   vec3 leaving;  // radiance of direct light that entered elsewhere
   vec3 straight; // of the diffuse albedo, what direct light is reflected by here
 #ifdef HIT_LINKS
@@ -134,6 +135,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
 {
   ivec2 hit;
   t = trace_nearest(origin, direction, limit, salt, hit);
+  met.passed = layers_color(t);
   if (t >= limit) {
     return false;
   }
@@ -292,6 +294,7 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
+        chosen_light *= layers_color(1e30);
       }
       chosen_light *= passing_media(origin, chosen_direction, light_distance(light, origin, chosen_direction), salt);
       Reflection reflection = met.reflection;

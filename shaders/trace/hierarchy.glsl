@@ -271,6 +271,57 @@ uint boxes_met(Boxes b, vec3 origin, vec3 inverse, float reach, out vec4 enter)
   return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
 }
 
+// Colours of layers that the last ray of trace_layers has passed: each over the chance that a ray passes it at all. Three are
+// kept apart, of more the farthest are one.
+#ifdef TINTED_LAYERS
+#define LAYERS_KEPT 3
+#define EMISSION_TEXEL 10
+#define TINT_CODE 1000.0  // see addon/scene/traced_triangles.py
+vec4 layers_met[LAYERS_KEPT];  // colour, distance; nearest first
+
+void layers_begin()
+{
+  for (int k = 0; k < LAYERS_KEPT; k++) {
+    layers_met[k] = vec4(1.0, 1.0, 1.0, 1e30);
+  }
+}
+
+void layers_pass(int leaf, vec4 t, float limit, bvec4 stops, vec4 opacity)
+{
+  int base = leaf * LEAF_TEXELS + EMISSION_TEXEL;
+  vec4 red = leaf_texel(base);
+  for (int i = 0; i < 4; i++) {
+    // Of no opacity at all are those that such rays do not meet.
+    if (t[i] < limit && !stops[i] && opacity[i] > 0.0 && red[i] <= -TINT_CODE) {
+      vec4 layer = vec4(-vec3(red[i], leaf_texel(base + 1)[i], leaf_texel(base + 2)[i]) - TINT_CODE, t[i]);
+      for (int k = 0; k < LAYERS_KEPT; k++) {
+        if (layer.w < layers_met[k].w) {
+          vec4 farther = layers_met[k];
+          layers_met[k] = layer;
+          layer = farther;
+        }
+      }
+      layers_met[LAYERS_KEPT - 1].rgb *= (layer.w < 1e29) ? layer.rgb : vec3(1.0);
+    }
+  }
+}
+
+// Of those nearer than `limit`, together.
+vec3 layers_color(float limit)
+{
+  vec3 color = vec3(1.0);
+  for (int k = 0; k < LAYERS_KEPT; k++) {
+    color *= (layers_met[k].w < limit) ? layers_met[k].rgb : vec3(1.0);
+  }
+  return color;
+}
+#else
+vec3 layers_color(float limit)
+{
+  return vec3(1.0);
+}
+#endif
+
 // The nearest triangle of a leaf that stops a ray before `nearest`, which it then is, if there is one.
 void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool bent, bool shadow, inout float nearest,
               inout ivec2 hit)
@@ -286,7 +337,11 @@ void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool
     uint roll = hash3(uvec3(uint(leaf), salt, 77u + uint(record))).x;
     vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
                        to_unit(roll * 277803737u + 7u));
-    t = mix(vec4(1e30), t, lessThan(chance, opacity));
+    bvec4 stops = lessThan(chance, opacity);
+#ifdef TINTED_LAYERS
+    layers_pass(leaf, t, nearest, stops, opacity);
+#endif
+    t = mix(vec4(1e30), t, stops);
     best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
       nearest = best;
@@ -304,6 +359,9 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
                    out ivec2 hit)
 {
   hit = ivec2(-1);
+#ifdef TINTED_LAYERS
+  layers_begin();
+#endif
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
   float nearest = limit;
   Place place;
@@ -466,7 +524,11 @@ vec3 triangle_emission(ivec2 hit, vec3 direction, out vec3 normal)
   }
 #endif
   bool dark = way * dot(normal, direction) > 0.0;
-  return dark ? vec3(0.0) : vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
+  vec3 emission = vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
+#ifdef TINTED_LAYERS
+  dark = dark || emission.x <= -TINT_CODE;
+#endif
+  return dark ? vec3(0.0) : emission;
 }
 
 // Points are drawn on emissive triangles with this density per area, over the power of all (addon/lighting/emissive_triangles.py).

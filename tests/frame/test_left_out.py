@@ -85,6 +85,7 @@ def test_coloured_layers_that_bounced_light_passes_as_grey_are_named(monkeypatch
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
     scene = SimpleNamespace(camera=None, used_materials={0, 1})
     materials = [SimpleNamespace(name=name, tinted=tinted) for name, tinted in (("A", False), ("B", True), ("C", True))]
-    (note,) = left_out.notes_of(Plan((), (), {"indirect": "instant_radiosity"}), scene, FEW, materials)
+    (note,) = left_out.notes_of(Plan((), (), {"indirect": "ssdo"}), scene, FEW, materials)
     assert note.subject == "Material 'B'" and "grey" in note.text
-    assert left_out.notes_of(Plan((), (), {}), scene, FEW, materials) == ()
+    for filled in ({}, {"indirect": "instant_radiosity"}):
+        assert left_out.notes_of(Plan((), (), filled), scene, FEW, materials) == ()
