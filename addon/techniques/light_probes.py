@@ -38,6 +38,7 @@ from ..sources import environment, lights
 from ..sources.rates import USUAL_SAMPLES, Rate, allocate, budget_for, directions_for, paying
 from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 from .accumulated_maps import AccumulatedMaps
+from .shadows_by_light import ShadowsByLight, seen_in_parts
 
 GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
 FINE_PROBES = (24, 18)  # for guiding, where their rays are few
@@ -188,8 +189,9 @@ class LightProbes(Technique):
         samples = frame.settings.samples
         share = relative_share(moments[..., 0])
         film = [EDGES * sum(s for s, place in zip(share, places) if place == one) ** 2 for one in distinct]
-        # Soft maps show a light as a whole: few samples need no more of them.
-        points = frame.plan.runs(AccumulatedMaps.name)
+        # Soft maps show a light as a whole: few samples need no more of them, but where none has one.
+        by_light = frame.plan.runs(ShadowsByLight.name)
+        points = frame.plan.runs(AccumulatedMaps.name) or (by_light and all(seen_in_parts(frame, e) for e in emitters))
         planned = samples if points else max(samples, USUAL_SAMPLES)
         alone = not frame.plan.fills("indirect")
         asked = frame.settings.get(self, "maps")

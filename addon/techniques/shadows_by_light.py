@@ -20,7 +20,7 @@ points of the lights (accumulated_maps.py) converge, and which is better is left
 of a moving view keep points too: their maps are drawn in half the time.
 As a whole, a light has one cone and one distance: a spot's cone would stay sharp that its size blurs, and penumbrae of
 a large round light near by are others. Where rays cost no more than maps, points take them (`bench auto`, one sample:
-stairs .049 to .021, ball .033 to .017).
+stairs .049 to .011, ball .033 to .010).
 
 Few lights have soft maps of at least 512 texels a side. Cost and bias are those of the kinds; each shares one atlas.
 
@@ -149,16 +149,13 @@ class ShadowsByLight(PointMaps):
 
     def _is_seen_in_parts(self, frame: Frame, emitter: lights.Emitter) -> bool:
         """Whether the light, taken as a whole, would err more than one point of it does, which rays can ask for."""
-        near = emitter.kind in (lights.POINT, lights.SPHERE) and (
-            emitter.radius > NEAR * edge_tiles.nearest_receiver(frame, emitter)
-        )
         plain = self._providers[PLAIN]
-        if frame.settings.samples > 1 or not (near or blurs_its_cone(frame, emitter)):
+        if frame.settings.samples > 1 or not seen_in_parts(frame, emitter):
             return False
         plain.begin(frame)
         traced = plain.traces(frame, emitter)
         if traced:
-            why = "it is near, round and large" if near else "its size blurs the edge of its cone"
+            why = "it is near, round and large" if is_near(frame, emitter) else "its size blurs the edge of its cone"
             frame.account.chose(self, emitter.light.name, f"rays to its points, because {why}")
         return traced
 
@@ -203,6 +200,17 @@ class ShadowsByLight(PointMaps):
         for service in self._providers.values():
             service.release()
         self._kinds = {}
+
+
+def seen_in_parts(frame: Frame, emitter: lights.Emitter) -> bool:
+    """Whether a light, taken as a whole, has another cone or other penumbrae than its points have together."""
+    return is_near(frame, emitter) or blurs_its_cone(frame, emitter)
+
+
+def is_near(frame: Frame, emitter: lights.Emitter) -> bool:
+    """Whether it is a ball whose radius is much beside its distance from what is seen."""
+    round_light = emitter.kind in (lights.POINT, lights.SPHERE)
+    return round_light and emitter.radius > NEAR * edge_tiles.nearest_receiver(frame, emitter)
 
 
 def blurs_its_cone(frame: Frame, emitter: lights.Emitter) -> bool:
