@@ -3,9 +3,10 @@
 Each scene is opened in a Blender with a window ($REAL_BLENDER, as for `make test-window`), with empty caches of driver
 and Blender, and with the newest zip of build/ as the extension. Rendered is chosen; when the picture rests, a lamp, a
 material of glass, and a border are added, one after the other. Of each: seconds until the view shows anything, until it
-shows the scene's light, and until it rests, and the longest time in which Blender did not answer: seconds of the clock,
-and of all threads of this process, which say more where other work shares the processors. With `--motion` instead:
-steps in a second and pixels, while a view turns and while an animation is played, beside EEVEE in the same window.
+shows the scene's light (at first its direct light alone), all of it, and until it rests, and the longest time in which
+Blender did not answer: seconds of the clock, and, in brackets, of all threads of the window's process, which say more
+where other work shares the processors. With `--motion` instead: steps in a second and pixels, while a view turns and
+while an animation is played, beside EEVEE in the same window.
 """
 
 from __future__ import annotations
@@ -76,14 +77,16 @@ def measured(scene: Path, backend: str, steps: list[str], package: Path, folder:
 
 
 def rows_of(scene: str, backend: str, found: dict) -> list[tuple[str, ...]]:
-    def told(seconds: float | None) -> str:
-        return "-" if seconds is None else f"{seconds:.1f}"
+    def told(one: dict, what: str) -> str:
+        if one.get(f"{what}_s") is None:
+            return "-"
+        worked = f" ({one[f'{what}_work_s']:.1f})" if f"{what}_work_s" in one else ""
+        return f"{one[f'{what}_s']:.1f}{worked}"
 
     return [
         (
-            scene, backend, step, told(one["first_s"]) if step == "rendered" else "", told(one["lit_s"]),
-            told(one.get("whole_s")),
-            told(one["rest_s"]), f"{one['longest_s']:.2f}", f"{one['longest_draw_s']:.2f}",
+            scene, backend, step, told(one, "first") if step == "rendered" else "", told(one, "lit"),
+            told(one, "whole"), told(one, "rest"), f"{one['longest_s']:.2f}", f"{one['longest_draw_s']:.2f}",
             f"{one.get('dearest_s', 0.0):.2f}", one["longest_at"],
         )
         for step, one in found.items()
@@ -112,6 +115,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", default=SCENES, metavar="NAME", help="scenes, as of `bench beside`")
     parser.add_argument("--backend", nargs="+", default=["opengl"], choices=("opengl", "vulkan"))
     parser.add_argument("--steps", nargs="+", default=list(STEPS), choices=STEPS)
+    parser.add_argument("--until-light", action="store_true", help="do not wait until the picture rests")
     parser.add_argument("--motion", action="store_true", help="a turning view and playback, beside EEVEE, instead")
     parser.add_argument("--package", type=Path, help="the extension's zip; by default the newest of build/")
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "cold", help="for logs and pictures")
@@ -123,12 +127,12 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     package = options.package or max(ROOT.glob("build/candela-*.zip"), key=lambda path: path.stat().st_mtime)
-    rows = []
+    rows, until = [], ["until_light"] if options.until_light else []
     with quiet() as terminal:
         for backend in options.backend:
             for scene in scenes_of(list(options.only)):
                 folder = options.output / f"{scene.stem}-{backend}"
-                steps, script = ([], MOTION) if options.motion else (list(options.steps), COLD)
+                steps, script = ([], MOTION) if options.motion else ([*options.steps, *until], COLD)
                 found = measured(scene, backend, steps, package, folder, script)
                 if "error" in found:
                     print(scene.stem, backend, found["error"], file=terminal, flush=True)

@@ -55,6 +55,13 @@ FINE = passes.fullscreen_program(
     constants=(("FLOAT", "faint"),),
     outputs=(("VEC4", "out_fine"),),
 )
+FILL = passes.fullscreen_program(
+    "first look fills in",
+    "surface/first_look_fill.frag.glsl",
+    textures=(("RGBA16F", "look"), ("RGBA32F", "coarse")),
+    outputs=(("VEC4", "out_fine"),),
+)
+FILLED = 0.1  # radiance of a white surface that faces the eye, by the exposure, in place of indirect light
 SOLID = 0.9  # opacity from which on a surface hides what is behind
 FAINT = 0.02  # radiance, by the exposure, that is as good as black where colours are compared
 
@@ -80,20 +87,25 @@ class FirstLook:
 
     def draw(
         self, snapshot: Snapshot, geometry: SceneGeometry, materials: list[CompiledMaterial], view: View,
-        guides: bool = False,
+        guides: bool = False, fills: bool = False,
     ) -> images.Image:  # fmt: skip
         """The scene as `geometry` holds it, through a view of it. What lets light pass hides every other pixel; of what
-        `guides` a draft glass is whole, and other such surfaces, whose shape stands in an image, are left out."""
+        `guides` a draft glass is whole, and other such surfaces, whose shape stands in an image, are left out. What
+        `fills` in has a faint light from the eye alone."""
         values = view.values(0, 0, (0.0, 0.0), geometry.size)
+        lamps = lamp_values(snapshot, geometry, values)
+        if fills:
+            head = FILLED * np.pi / max(snapshot.film.exposure, 1e-6)
+            lamps |= {"ambient": (0.0, 0.0, 0.0, head), "count": (0.0,) * 4}
         self._view = _updated(self._view, VIEW, values)
-        self._lamps = _updated(self._lamps, LAMPS, lamp_values(snapshot, geometry, values))
+        self._lamps = _updated(self._lamps, LAMPS, lamps)
         if self._target is None or self._target.size != view.size:
             self.release()
             formats = ("RGBA16F", "RGBA16F", "DEPTH_COMPONENT32F")
             look, guide, depth = (images.pool.take(*view.size, one) for one in formats)
             self._target = images.Target((look, guide), depth)
         self._target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-        images.Target((self._target.colors[0],)).clear(background(snapshot))
+        images.Target((self._target.colors[0],)).clear((0.0,) * 4 if fills else background(snapshot))
         rows = np.array([values[row] for row in ("row_x", "row_y", "row_w", "row_q")])
         shader, material = passes.get(FIRST_LOOK), None
         with passes.drawing(self._target):
@@ -105,10 +117,10 @@ class FirstLook:
                     shader.bind(
                         textures={"instances": geometry.instances},
                         blocks={"film_view": self._view, "first_lamps": self._lamps},
-                        constants={"first_instance": call.first, **_look_of(shown, guides)},
+                        constants={"first_instance": call.first, **_look_of(shown, guides, fills)},
                     )
                 elif call.draw.material != material:
-                    shader.change(constants=_look_of(shown, guides))
+                    shader.change(constants=_look_of(shown, guides, fills))
                 material = call.draw.material
                 shader.set_constant("first_instance", call.first)
                 passes.draw(shader, call.draw.batch, call.count)
@@ -125,6 +137,12 @@ class FirstLook:
         faint = FAINT / max(exposure, 1e-6)
         passes.fullscreen(FINE, self._fine, textures=textures, constants={"faint": faint})
         return self._fine.colors[0]
+
+    def fill_in(self, lit: images.Image, target: images.Target, *scene) -> None:
+        """Into the target a picture that has direct light alone, with a faint light from the eye in its shadows.
+        `scene`: as of `draw`, through the picture's own view."""
+        self.draw(*scene, fills=True)
+        passes.fullscreen(FILL, target, textures={"look": self.picture, "coarse": lit})
 
     def _give_fine(self) -> None:
         if self._fine is not None:
@@ -151,9 +169,9 @@ def _lets_pass(material: CompiledMaterial) -> bool:
     return material.transparent and material.opacity < SOLID
 
 
-def _look_of(material: CompiledMaterial, guides: bool) -> dict[str, tuple[float, ...]]:
+def _look_of(material: CompiledMaterial, guides: bool, fills: bool) -> dict[str, tuple[float, ...]]:
     solid = float(guides or not (_lets_pass(material) or material.glass is not None))
-    glow = np.clip(np.nan_to_num(material.emission, posinf=1e4), 0.0, 1e4)
+    glow = np.zeros(3) if fills else np.clip(np.nan_to_num(material.emission, posinf=1e4), 0.0, 1e4)
     return {"flat_color": (*np.clip(material.color, 0.0, 1.0), solid), "flat_glow": (*glow, 0.0)}
 
 

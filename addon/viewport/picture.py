@@ -263,8 +263,14 @@ class Viewport:
             self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
         if self.render_pass is None:
             at = frame.at
-            passes.copy(self.renderer.show(frame), self._target)
+            shown = self.renderer.show(frame)
             frame.at = at
+            if self.direct and frame.snapshot.camera.panorama is None:
+                view = View(frame.snapshot.camera, frame.snapshot.film, self.renderer.geometry.origin)
+                scene = self._snapshot, self.renderer.geometry, self.renderer.materials.compiled
+                self.guide.fill_in(shown, self._target, *scene, view)
+            else:
+                passes.copy(shown, self._target)
         else:
             one_pass.draw(frame, self.render_pass, self._target)
         self._shown_with, self.looks = frame.plan.shown_with(frame.snapshot, frame.settings), False

@@ -9,6 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.gfx import images
+from addon.surfaces import first_look
 from addon.viewport import ahead
 from addon.viewport.ahead import DRAFT, FULL, Ahead, needs_of
 from tests.viewport.region import Region
@@ -180,3 +182,22 @@ def test_process_that_ends_is_done_without(region, own_folder, monkeypatch):
         region.draw()
     assert other.failed and not region.viewport.held
     region.rest()
+
+
+def test_shadows_of_direct_light_are_not_black_meanwhile(region, monkeypatch):
+    """A faint light from the eye stands in for indirect light until its programs are there."""
+
+    def direct():
+        region.viewport.drop()
+        region.viewport.ahead = Slow()
+        for _ in range(12):
+            region.clock.now += 1.0
+            region.draw()
+        assert region.viewport.held and region.viewport.direct
+        return images.read(region.viewport.picture)
+
+    filled = direct()
+    monkeypatch.setattr(first_look, "FILLED", 0.0)
+    plain = direct()
+    assert 0.01 < (filled - plain)[..., :3].mean() < 0.1
+    np.testing.assert_allclose(filled[..., 3], plain[..., 3], atol=1e-3)

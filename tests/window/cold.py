@@ -14,6 +14,7 @@ from stage import ENGINE, FOLDER, candela, picture, result, run, viewport_area, 
 
 SAMPLES = 2
 TIMEOUT_S = 400.0  # of one step
+UNTIL_LIGHT = "until_light"  # as an argument
 PAUSE_S = 0.02  # between two looks; more of them would take processors from what is measured
 
 
@@ -22,7 +23,8 @@ class Watch:
 
     def __init__(self):
         self.started = self.before = time.monotonic()
-        self.worked, self.dearest = time.process_time(), 0.0
+        self.began = self.worked = time.process_time()
+        self.dearest = 0.0
         self.longest, self.longest_at, self.said = 0.0, "", set()
         self.draws = []  # seconds of Candela's own part of redraws
         self._draw = candela().draw
@@ -48,6 +50,11 @@ class Watch:
     def seconds(self):
         return time.monotonic() - self.started
 
+    @property
+    def work(self):
+        """Seconds of the processor."""
+        return time.process_time() - self.began
+
     def end(self):
         candela().draw = self._draw
         return {
@@ -57,14 +64,16 @@ class Watch:
         }  # fmt: skip
 
 
-def until_rest(name, change):
-    """Make a change, and wait until the viewport rests; what is noted stands in the result under the name."""
+def until_rest(name, change, until_light=False):
+    """Make a change, and wait until the viewport rests, or shows all light; what is noted stands in the result under
+    the name."""
     watch = Watch()
     watched = viewports()[0] if viewports() else None
     old = watched.frame if watched else None
     change()
     watch.look()
     first = lit = whole = None
+    work = {}
     while watch.seconds < TIMEOUT_S:
         yield PAUSE_S
         watch.look()
@@ -74,20 +83,27 @@ def until_rest(name, change):
         if one.error:
             raise RuntimeError(one.error)
         if first is None and one.picture is not None:
-            first = watch.seconds
+            first, work["first_work_s"] = watch.seconds, watch.work
         anew = one.frame is not None and one.frame is not old and one.frame.samples_done > 0
         if lit is None and anew and one.picture is not None and not one.looks:
-            lit = watch.seconds
+            lit, work["lit_work_s"] = watch.seconds, watch.work
             picture(f"{name}_lit.png")
             watch.before, watch.worked = (
                 time.monotonic(),
                 time.process_time(),
             )  # the picture of the window takes its time
-        if whole is None and lit is not None and not one.direct and anew and not one.looks:
+        if whole is None and lit is not None and not getattr(one, "direct", False) and anew and not one.looks:
             whole = watch.seconds  # with its indirect light
-        if lit is not None and one.done and not one.dirty:
+        if (lit is not None and one.done and not one.dirty) or (whole is not None and until_light):
             break
-    result[name] = {"first_s": first, "lit_s": lit, "whole_s": whole, "rest_s": watch.seconds, **watch.end()}
+    result[name] = {
+        "first_s": first,
+        "lit_s": lit,
+        "whole_s": whole,
+        "rest_s": watch.seconds,
+        "rest_work_s": watch.work,
+    }
+    result[name] |= {**work, **watch.end()}
     picture(f"{name}.png")
     yield 0.2
 
@@ -126,10 +142,11 @@ def steps():
         scene.render.border_min_x = scene.render.border_min_y = 0.25
         scene.render.border_max_x = scene.render.border_max_y = 0.75
 
-    wanted = sys.argv[sys.argv.index("--") + 1 : -1] or ["rendered", "lamp", "material", "border"]
+    asked = [one for one in sys.argv[sys.argv.index("--") + 1 : -1] if one != UNTIL_LIGHT]
+    wanted = asked or ["rendered", "lamp", "material", "border"]
     changes = {"rendered": choose, "lamp": add_lamp, "material": add_material, "border": border}
     for name in wanted:
-        yield from until_rest(name, changes[name])
+        yield from until_rest(name, changes[name], UNTIL_LIGHT in sys.argv)
     result["folder"] = str(FOLDER)
 
 

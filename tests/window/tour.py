@@ -33,6 +33,7 @@ def steps():
     left.spaces.active.shading.type = "RENDERED"
     yield from wait_for_rest()
     picture("tour_engine.png")
+    yield from popovers(left, right)
     bounces, scene.candela.bounces = scene.candela.bounces, 0  # indirect light takes its time without a GPU
     yield from edits(left, right, scene)
     yield from shadow(right, scene)
@@ -48,6 +49,24 @@ def two_areas():
     left, right = sorted((a for a in window().screen.areas if a.type == "VIEW_3D"), key=lambda a: a.x)
     right.type = "PROPERTIES"
     return left, right
+
+
+def popovers(left, right):
+    """What opens from a header: the menu Render Pass of the view, and the quality presets of the render settings."""
+    for area, panel, x, name in (
+        (left, "VIEW3D_PT_shading", left.x + left.width - 40, "passes"),
+        (right, "CANDELA_PT_quality_presets", right.x + right.width - 120, "presets"),
+    ):
+        y = area.y + area.height - 40
+        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+        yield 0.3
+        with there(area):
+            bpy.ops.wm.call_panel(name=panel, keep_open=True)
+        yield 1.0
+        picture(f"tour_{name}.png")
+        for value in ("PRESS", "RELEASE"):
+            window().event_simulate(type="ESC", value=value, x=x, y=y)
+        yield 0.5
 
 
 def edits(left, right, scene):
