@@ -45,7 +45,6 @@ class PathSources:
     def __init__(self, paths: Sequence[str], use: str, directions: int = 2, emissive_points: int = 2):
         self.paths, self.use = tuple(paths), use
         self.directions, self.emissive_points = directions, emissive_points
-        self.most_lamps = lights.MOST_LIGHTS - directions - emissive_points
         self._sources = lights.Sources()
         self._emitters: list[lights.Emitter] = []
         self._triangles: EmissiveTriangles | None = None
@@ -70,6 +69,11 @@ class PathSources:
         """Of all these, as bits, for LIGHT_KINDS of a program."""
         others = (self._triangles is not None) << lights.SURFACE | bool(self.world_flags) << lights.DIRECTION
         return to_hold(lights.kinds_of(self._emitters) | others, -1)
+
+    @property
+    def most_lamps(self) -> int:
+        """In a sample."""
+        return lights.MOST_LIGHTS - self.directions - self.emissive_points
 
     @property
     def emissive_power(self) -> float:
@@ -99,7 +103,8 @@ class PathSources:
                 index = frame.sample * self.emissive_points + k
                 drawn = frame.random_volume(f"{self.use}/emissive", index)
                 blocked = lights.GLASS_BLOCKS_FLAG * (MESHES in by_photons)
-                rows.append(self._triangles.row(drawn, self.emissive_points, lights.SHADOW_FLAG + blocked))
+                flags, samples = lights.SHADOW_FLAG + blocked, frame.settings.samples
+                rows.append(self._triangles.row(drawn, self.emissive_points, flags, samples=samples))
         if self.world_flags:
             seen = lights.SHADOW_FLAG + self.world_flags
             bright = bright_world(frame) if WORLD in by_photons else None

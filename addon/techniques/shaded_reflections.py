@@ -72,7 +72,8 @@ from .environment_light import directions_rate
 from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
-EMISSIVE_POINTS = 4
+EMISSIVE_POINTS, FEW_EMISSIVE_POINTS = 4, 16  # the second in pictures of fewer than FEW samples
+FEW = 4
 GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
 STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"), ("R32F", "ray_travelled"))
 REACH = (
@@ -244,6 +245,7 @@ class ShadedReflections(Technique, BothWays):
         self._active = self._follows(frame)
         if self._active:
             frame.provide(ShadedLobes(frame.settings.get(self, "roughness")))
+            self._sources.emissive_points = FEW_EMISSIVE_POINTS if frame.settings.samples < FEW else EMISSIVE_POINTS
             self._sources.begin(frame)
             sampled = frame.plan.runs("environment_light")  # of its directions rays of the first lobe leave a share
             of_first = directions_rate(frame).per_sample if sampled else 0.0
@@ -412,7 +414,7 @@ class ShadedReflections(Technique, BothWays):
     def _emissive(self, power: float, points: float, number: int) -> tuple[float, float, float, float]:
         """Power of emissive surfaces and points drawn on them in a sample: for glossy surfaces that the camera sees,
         and for all others."""
-        others = float(EMISSIVE_POINTS) if number else GLASS_POINTS
+        others = float(self._sources.emissive_points) if number else GLASS_POINTS
         return power, points, self._sources.emissive_power, others
 
     def _add_guide(self, frame, rays, records, closures, reach) -> None:
