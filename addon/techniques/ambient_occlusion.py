@@ -33,7 +33,7 @@ CAST = passes.fullscreen_program(
     "occlusion/open.frag.glsl",
     textures=(*acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES),
     blocks=((VIEW, "film_view"),),
-    constants=(("FLOAT", "farthest"), ("FLOAT", "offset_size"), ("INT", "number")),
+    constants=(("FLOAT", "farthest"), ("FLOAT", "offset_size"), ("INT", "point_number")),
     outputs=(("VEC4", "out_open"),),
 )
 
@@ -66,7 +66,7 @@ class AmbientOcclusion(Technique):
                     CAST, drawn, textures={**surfaces, **hierarchy.textures}, blocks={"film_view": frame.view_block},
                     constants={
                         "farthest": frame.snapshot.film.open_within, "offset_size": frame.offset_size,
-                        "number": self._number,
+                        "point_number": self._number,
                     },
                 )  # fmt: skip
                 frame.count(self, "rays", frame.size[0] * frame.size[1])

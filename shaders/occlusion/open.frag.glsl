@@ -13,10 +13,10 @@ void main()
     return;
   }
   uvec3 roll = roll_of(pixel, 0, film_view.seed, 251);
-  vec2 u = vec2(shuffled(number, roll.xy), shuffled(number, roll.yz));
+  vec2 u = vec2(shuffled(point_number, roll.xy), shuffled(point_number, roll.yz));
   vec3 direction = cosine_direction(s.normal, u);
   if (dot(direction, s.geometric_normal) > 0.0) {
-    float open = clear_path(ray_origin(s.position, s.geometric_normal), direction, farthest, roll.x + uint(number));
+    float open = clear_path(ray_origin(s.position, s.geometric_normal), direction, farthest, roll.x + uint(point_number));
     out_open = vec4(vec3(open), 1.0);
   }
 }
