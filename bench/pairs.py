@@ -254,9 +254,22 @@ def worst(known: dict[str, dict[str, dict]], most: int = 20) -> list[list[str]]:
     return rows
 
 
+def nearest(known: dict[str, dict[str, dict]], samples: int = 16, most: int = 8) -> list[list[str]]:
+    """What is nearest to its bounds of all that is within them."""
+    ratio, relmse = BOUNDS[samples]
+    found = [
+        (names, one) for names, by in known.items() if colour(one := by.get(str(samples), {"failed": ""})) == GREEN
+    ]
+    near = sorted(found, key=lambda item: -max(abs(item[1]["ratio"] - 1) / ratio, item[1]["blocks"] / relmse))
+    rows = [["features", "mean over Cycles'", "relMSE of blocks"]]
+    return [*rows, *([names, f"{one['ratio']:.3f}", f"{one['blocks']:.4f}"] for names, one in near[:most])]
+
+
 def write_page(known: dict[str, dict[str, dict]]) -> None:
     """The page's tables and its picture, of all pairs that are known."""
-    alone, pairs = ({names: found for names, found in known.items() if names.count(" + ") == n} for n in (0, 1))
+    alone, pairs, triples = (
+        {names: found for names, found in known.items() if names.count(" + ") == n} for n in (0, 1, 2)
+    )
     draw(pairs)
     if not PAGE.exists():
         write_whole(PAGE, f"# Features that meet\n\n{begin(COMMAND)}\n<!-- end of what is written -->\n")
@@ -264,7 +277,9 @@ def write_page(known: dict[str, dict[str, dict]]) -> None:
     text = (
         f"Features alone:\n\n{table(summary(alone))}\n\n{table(worst(alone))}\n\n"
         f"{len(pairs)} of {every} pairs:\n\n{table(summary(pairs))}\n\n"
-        f"![Pairs of features](images/{PICTURE.name})\n\n{table(worst(pairs, 30))}"
+        f"![Pairs of features](images/{PICTURE.name})\n\n{table(worst(pairs, 30))}\n\n"
+        f"{len(triples)} triples at random:\n\n{table(summary(triples))}\n\n{table(worst(triples))}\n\n"
+        f"Nearest to their bounds of all that are green, with 16 samples:\n\n{table(nearest(known))}"
     )
     put_between(PAGE, COMMAND, text)
 

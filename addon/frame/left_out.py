@@ -39,8 +39,8 @@ def notes_of(
 
 def _bounces_past(plan: Plan, tinted: Iterable[CompiledMaterial]) -> Iterator[Note]:
     """Where nothing counts the colours that rays of bounced light pass."""
-    if plan.filled.get("indirect", COLOURED[0]) not in COLOURED:
-        for one in tinted:
+    for one in tinted if "indirect" in plan.filled else ():
+        if one.emissive or plan.filled["indirect"] not in COLOURED:  # rays know one colour of a surface
             text = (
                 "its coloured transparency colours light that comes straight; bounced light passes it as through grey."
             )

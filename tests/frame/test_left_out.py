@@ -84,8 +84,13 @@ def test_coloured_layers_that_bounced_light_passes_as_grey_are_named(monkeypatch
     for name in ("too_many", "too_many_copies"):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
     scene = SimpleNamespace(camera=None, used_materials={0, 1})
-    materials = [SimpleNamespace(name=name, tinted=tinted) for name, tinted in (("A", False), ("B", True), ("C", True))]
+    materials = [
+        SimpleNamespace(name=name, tinted=tinted, emissive=False)
+        for name, tinted in (("A", False), ("B", True), ("C", True))
+    ]
     (note,) = left_out.notes_of(Plan((), (), {"indirect": "ssdo"}), scene, FEW, materials)
     assert note.subject == "Material 'B'" and "grey" in note.text
+    glowing = [SimpleNamespace(name="D", tinted=True, emissive=True)]
+    assert left_out.notes_of(Plan((), (), {"indirect": "instant_radiosity"}), scene, FEW, glowing)
     for filled in ({}, {"indirect": "instant_radiosity"}):
         assert left_out.notes_of(Plan((), (), filled), scene, FEW, materials) == ()
