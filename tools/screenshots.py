@@ -17,12 +17,13 @@ ROOT = Path(__file__).resolve().parent.parent
 BACKEND = "opengl"
 LEFT = (0, 26, 1058, 694)  # the large area of the Layout workspace
 HALF = (0, 26, 636, 694)
+POPOVER = (0, 0, 800, 560)
 RIGHT = (636, 26, 422, 694)
 DIALOG = (430, 240, 628, 340)  # around the middle of the properties
 # Picture in docs/images, script, picture of the window, what is cut out: a box or a name in the script's result.
 PICTURES = (
     ("viewport_rest", "tour", "tour_engine", HALF),
-    ("viewport_passes", "tour", "tour_passes", HALF),
+    ("viewport_passes", "tour", "tour_passes", POPOVER),
     ("panel_presets", "tour", "tour_presets", RIGHT),
     ("viewport_moving", "drive", "viewport_moving", LEFT),
     ("panel_render", "drive", "panel_render", "properties"),

@@ -84,15 +84,16 @@ def until_rest(name, change, until_light=False):
             raise RuntimeError(one.error)
         if first is None and one.picture is not None:
             first, work["first_work_s"] = watch.seconds, watch.work
+        looks, direct = getattr(one, "looks", False), getattr(one, "direct", False)  # which older versions lack
         anew = one.frame is not None and one.frame is not old and one.frame.samples_done > 0
-        if lit is None and anew and one.picture is not None and not one.looks:
+        if lit is None and anew and one.picture is not None and not looks:
             lit, work["lit_work_s"] = watch.seconds, watch.work
             picture(f"{name}_lit.png")
             watch.before, watch.worked = (
                 time.monotonic(),
                 time.process_time(),
             )  # the picture of the window takes its time
-        if whole is None and lit is not None and not getattr(one, "direct", False) and anew and not one.looks:
+        if whole is None and lit is not None and anew and not direct and not looks:
             whole = watch.seconds  # with its indirect light
         if (lit is not None and one.done and not one.dirty) or (whole is not None and until_light):
             break
