@@ -3,7 +3,8 @@
 Each number makes one scene: objects of several kinds under modifiers, Principled materials with random values, textures
 and mixes, lamps of all kinds and shapes, a world, a camera; in metres, hundredths or hundreds of them. Both engines
 render it without bounces, or with all light, and what differs by more than noise is printed with what the scene holds.
-`--save` writes a scene to a file instead, to be taken apart.
+`--save` writes a scene to a file instead, to be taken apart. `--alone SECONDS` renders as many as fit in that time by
+Candela alone, and tells of pixels that are not finite, of errors, and what memory the process held meanwhile.
 """
 
 from __future__ import annotations
@@ -11,8 +12,11 @@ from __future__ import annotations
 import argparse
 import math
 import random
+import resource
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import bpy
 import mathutils
@@ -293,7 +297,45 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=size_of, default=(96, 72), metavar="WxH", help="default 96x72")
     parser.add_argument("--all-light", action="store_true", help="with bounces")
     parser.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relMSE that is off (default 0.01)")
+    parser.add_argument("--alone", type=float, metavar="SECONDS", help="as many as fit, by Candela alone, with bounces")
     parser.add_argument("--save", metavar="FILE.blend", help="write the first scene to a file and render nothing")
+
+
+def alone(first: int, seconds: float, size: tuple[int, int], samples: int, every: int = 25) -> int:
+    """Render scenes from number `first` on for `seconds`; 1 if one of them failed or had pixels that are not finite."""
+    from addon.compare.reference import render_passes
+    from addon.frame import ledger
+
+    wrong, held, number, until = [], [], first, time.monotonic() + seconds
+    while time.monotonic() < until:
+        scene, notes = build(number)
+        try:
+            render_passes(scene, "CANDELA", 1 + number % samples, number, size=size)
+            bad = ledger.latest().bad_pixels
+        except Exception as error:
+            bad = f"{type(error).__name__}: {error}"
+        if bad:
+            wrong.append(number)
+            print(
+                f"{number}: {bad if isinstance(bad, str) else f'{bad} pixels are not finite'}\n    {notes}", flush=True
+            )
+        number += 1
+        if (number - first) % every == 0:
+            held.append(resident())
+            print(f"{number - first} scenes, {held[-1]} MiB", flush=True)
+    spent = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    print(f"{number - first} scenes, {len(wrong)} wrong: {wrong}; {spent:.0f} s of the processor")
+    if len(held) > 3:
+        print(f"{held[len(held) // 4]} MiB after a quarter of them, {max(held)} at most, {held[-1]} at the end")
+    return int(bool(wrong))
+
+
+def resident() -> int:
+    """MiB of memory that this process holds; of operating systems that do not tell, the most that it held."""
+    statm = Path("/proc/self/statm")
+    if statm.exists():
+        return int(statm.read_text().split()[1]) * resource.getpagesize() >> 20
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
 
 
 def command(options: argparse.Namespace) -> int:
@@ -307,6 +349,8 @@ def command(options: argparse.Namespace) -> int:
         bpy.ops.wm.save_as_mainfile(filepath=options.save)
         print(notes)
         return 0
+    if options.alone:
+        return alone(options.first, options.alone, options.size, min(options.samples, 4))
     off = 0
     for number in range(options.first, options.first + options.count):
         scene, notes = build(number)

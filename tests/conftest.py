@@ -4,6 +4,7 @@ import hashlib
 import os
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
@@ -79,6 +80,23 @@ def empty_scene():
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return bpy.context.scene
+
+
+@pytest.fixture(scope="module", autouse=True)
+def memory_of_the_file(request):
+    """With CANDELA_MEMORY=FILE: a line for each file of tests, of what this process holds after it."""
+    yield
+    place = os.environ.get("CANDELA_MEMORY")
+    library, images = (sys.modules.get(f"addon.gfx.{name}") for name in ("library", "images"))
+    if not place or library is None or images is None:
+        return
+    resident = int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 2**20
+    with Path(place).open("a") as file:
+        file.write(
+            f"{os.getpid()} {resident:5d} MiB, {images.pool.allocated_bytes >> 20:4d} MiB of images, "
+            f"{library.kept():4d} programs, {len(library._dropped):4d} to be freed, {library.compile_count:5d} compiled"
+            f"  {request.node.name}\n"
+        )
 
 
 session_key = pytest.StashKey[pytest.Session]()

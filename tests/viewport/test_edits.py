@@ -129,7 +129,7 @@ def test_viewports_do_not_share_samples(scene, region):
 
 @pytest.mark.slow
 def test_resizing_leaves_no_images_behind(region):
-    """As many after twelve sizes as after four. (Each number of shadow maps has an image, which is not the window's.)"""
+    """As many after twelve sizes as after four: each number of shadow maps has an image, which is not the window's."""
 
     def resized(widths):
         for width in widths:
