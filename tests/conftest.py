@@ -82,6 +82,16 @@ def empty_scene():
     return bpy.context.scene
 
 
+@pytest.fixture(autouse=True)
+def few_programs():
+    """Programs that tests compile without a picture would stay until one begins: some 4 MB each of a software GPU, and
+    a process of them grew to 4 GB."""
+    yield
+    library = sys.modules.get("addon.gfx.library")
+    if library is not None and library.kept() > 2 * library.MOST_PROGRAMS:
+        library._release()
+
+
 @pytest.fixture(scope="module", autouse=True)
 def memory_of_the_file(request):
     """With CANDELA_MEMORY=FILE: a line for each file of tests, of what this process holds after it."""

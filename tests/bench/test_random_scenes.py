@@ -1,5 +1,7 @@
 """Scenes made at random: the same number makes the same scene, and what differs is said."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -38,3 +40,14 @@ def test_worst_pixels_do_not_decide():
     own = picture(1.0)
     own["direct_light"][0, 0] = 1.02
     assert not random_scenes.differences(own, picture(1.0), picture(1.0), 1e-6)[1]
+
+
+@pytest.mark.parametrize(("bad", "said"), [(0, "0 wrong"), (3, "3 pixels are not finite")])
+def test_scenes_by_candela_alone_are_counted_and_what_is_wrong_is_said(monkeypatch, capsys, bad, said):
+    from addon.compare import reference
+    from addon.frame import ledger
+
+    monkeypatch.setattr(reference, "render_passes", lambda *given, **options: None)
+    monkeypatch.setattr(ledger, "latest", lambda: SimpleNamespace(bad_pixels=bad))
+    assert random_scenes.alone(0, 0.2, (16, 12), 4, every=1) == int(bad > 0)
+    assert said in capsys.readouterr().out
