@@ -57,14 +57,12 @@ def answered(program: Program, present: tuple[Interface, ...]) -> Program:
     )
 
 
-def answer(
-    frame: Any, program: Program, textures: dict[str, Image], interfaces: tuple[Interface, ...]
-) -> tuple[Program, dict[str, Image]]:
-    """The program for what the frame has of what it asks of these, and `textures` with those that it reads then."""
+def answer(frame: Any, program: Program, textures: dict[str, Image], interfaces: tuple[Interface, ...]) -> Program:
+    """The program for what the frame has of what it asks of these. What it reads then is added to `textures`."""
     asked, there = asked_by(program), []
     for one in interfaces:
         found = one.present(frame) if one.asked in asked else None
         if found is not None:
             there.append(one)
-            textures = {**textures, **found}
-    return answered(program, tuple(there)), textures
+            textures |= found
+    return answered(program, tuple(there))

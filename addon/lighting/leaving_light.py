@@ -26,14 +26,11 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.technique import Service
 from ..gfx import images, passes
-from ..gfx.interface import Interface, answered, asked_by
-from ..gfx.library import Program
+from ..gfx.interface import Interface
 from ..scene import acceleration
 from ..scene.scatter_points import RANGE, ROW, ScatterPoints
 from ..scene.view import VIEW
 from ..surfaces.hits import Hits
-from .linked import linked_at_hits
-from .media import dimmed
 from .walked_light import FEW_WALKS
 
 LEAST_WALKS = 4  # of a point in a sample
@@ -83,22 +80,6 @@ def _leaving(frame: Frame) -> dict[str, images.Image] | None:
 
 
 LEAVES = Interface("leaving", "subsurface/leaving.glsl", (("RGBA32F", "leaving_light"),), _leaving)
-
-
-def sending(frame: Frame, program: Program, textures: dict[str, images.Image]) -> Program:
-    """The same pass of shaders/indirect/path.glsl, for surfaces that send light from below, if the frame has any; its
-    image is added to `textures`."""
-    found = LEAVES.present(frame) if LEAVES.asked in asked_by(program) else None
-    if found is None:
-        return program
-    textures |= found
-    return answered(program, (LEAVES,))
-
-
-def lit_at_hits(frame: Frame, program: Program, textures: dict[str, images.Image]) -> Program:
-    """The same pass of shaders/indirect/path.glsl, for all that the frame has: media, light from below surfaces, links.
-    Images of these are added to `textures`."""
-    return linked_at_hits(frame, sending(frame, dimmed(frame, program, textures), textures))
 
 
 class LeavingLight:

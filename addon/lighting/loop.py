@@ -29,16 +29,14 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
-from ..gfx.interface import answer
 from ..gfx.library import Program
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
 from . import linked, repeated_light, shared_visibility
+from .asked import asked
 from .caustic_casters import glass_alone
-from .grass import GRASS
-from .media import MEDIA
 from .repeated_light import Lit
 from .visibility import (
     RAY_CONSTANTS,
@@ -105,7 +103,7 @@ def shade(
     def answering(lookup: Lookup, textures: dict[str, images.Image]) -> tuple[Program, dict[str, images.Image]]:
         """The pass with this lookup for what the scene has, and what it reads then beside the surfaces."""
         textures = {"energy_table": frame.materials.energy_table, **textures}
-        program, textures = answer(frame, lighting(lookup, frame.materials.soft, kinds), textures, (GRASS, MEDIA))
+        program = asked(frame, lighting(lookup, frame.materials.soft, kinds), textures)
         return linked.linked(frame, technique, program, rows, textures), textures
 
     constants = {"light_count": len(rows), "traced_roughness": traced_roughness(frame), **maps.constants}

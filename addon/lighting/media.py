@@ -1,7 +1,7 @@
 """How fog dims light on its way: what media let pass, for passes that draw light or look along a view.
 
-A pass that asks how much light arrives from somewhere includes ask/media.glsl and is drawn by what `dimmed` makes of
-its program. Without a medium nothing of this is compiled.
+A pass that asks how much light arrives from somewhere includes ask/media.glsl and is drawn by what `asked`
+(lighting/asked.py) makes of its program. Without a medium nothing of this is compiled.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from ..frame.picture import Frame
 from ..frame.technique import Service, Technique
 from ..gfx import images, passes
-from ..gfx.interface import Interface, answered, asked_by
-from ..gfx.library import Program
+from ..gfx.interface import Interface, answer
 from ..gfx.struct import Block
 from ..scene.media import ATTENUATION_TEXTURES, Media
 from ..scene.view import VIEW
@@ -101,7 +100,7 @@ def passing_view(
         yield None
         return
     textures = {"surface_position": surfaces["surface_position"]}
-    program = dimmed(frame, VIEW_PROGRAM, textures)
+    program = answer(frame, VIEW_PROGRAM, textures, (MEDIA,))
     with images.borrowed(*frame.size, "RGBA32F") as target:
         passes.fullscreen(
             program, target, textures=textures, blocks={"film_view": frame.view_block, "sources": seen},
@@ -133,15 +132,6 @@ def _media(frame: Frame) -> dict[str, images.Image] | None:
 
 
 MEDIA = Interface("media", "media/media.glsl", ATTENUATION_TEXTURES, _media)
-
-
-def dimmed(frame: Frame, program: Program, textures: dict[str, images.Image]) -> Program:
-    """The same pass for what media the frame has, whose images are added to `textures`."""
-    found = MEDIA.present(frame) if MEDIA.asked in asked_by(program) else None
-    if found is None:
-        return program
-    textures |= found
-    return answered(program, (MEDIA,))
 
 
 def is_endless(frame: Frame) -> bool:

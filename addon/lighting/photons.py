@@ -48,10 +48,11 @@ from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
+from .asked import asked
 from .caustic_sources import sources_of
 from .glass_interfaces import most_interfaces, upload_interfaces
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
-from .media import dimmed, is_endless
+from .media import is_endless
 
 FOUND = ("photon_points", "photon_normals", "photon_fluxes")
 EMISSION = Struct(
@@ -289,7 +290,7 @@ class Photons:
                 "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
             }  # fmt: skip
             passes.fullscreen(
-                dimmed(frame, PHOTONS, textures),
+                asked(frame, PHOTONS, textures),
                 target,
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},
@@ -308,7 +309,7 @@ class Photons:
         for block, bound in self._drawn(frame, technique, casters, light, 1):
             textures = {**bound["textures"], **{name: behind[name] for _, name in BEHIND}, **receivers}
             passes.fullscreen(
-                dimmed(frame, LOOKUPS, textures),
+                asked(frame, LOOKUPS, textures),
                 target,
                 textures=textures,
                 blocks={"film_view": block, "map_view": map_block, **bound["blocks"]},

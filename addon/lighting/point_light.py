@@ -24,9 +24,9 @@ from ..materials.compiler import may_emit
 from ..sampling.sequence import uniform
 from ..sources import lights
 from . import linked
+from .asked import asked
 from .emissive_triangles import EmissiveTriangles
 from .loop import lighting
-from .media import dimmed
 from .visibility import RAYS, ray_bindings
 
 FEW_POINTS = 16  # on each lamp, of the world and of emissive meshes, in a picture of few samples
@@ -78,7 +78,7 @@ class PointLight:
         rows = [row for some in by_blockers.values() for row in some]
         drawn = 0
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
-        program = dimmed(frame, LIGHTING, bound)
+        program = asked(frame, LIGHTING, bound)
         with ExitStack() as stack:
             if instances is not None and linked.has_links(rows):
                 groups = stack.enter_context(images.borrowed(instances.width, instances.height, "R32F"))

@@ -51,9 +51,9 @@ from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
 from . import probes
+from .asked import lit_at_hits
 from .caustic_casters import answered, bright_world, meshes_answered
 from .emissive_triangles import EmissiveTriangles
-from .leaving_light import lit_at_hits
 from .light_choice import GROUP, Choice, seen_middle
 from .media import MediaService
 

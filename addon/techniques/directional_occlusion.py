@@ -42,8 +42,8 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..lighting import repeated_light
+from ..lighting.asked import asked
 from ..lighting.loop import DIRECT_WRITES
-from ..lighting.media import dimmed
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.panorama import bends_lines
@@ -119,7 +119,7 @@ class DirectionalOcclusion(Technique):
                 "offset_size": frame.offset_size,
             }  # fmt: skip
             frame.count(self, "rays", frame.size[0] * frame.size[1] * frame.settings.get(self, "fans"))
-        program = dimmed(frame, program, bindings["textures"])
+        program = asked(frame, program, bindings["textures"])
         with images.borrowed(*frame.size, "RGBA32F") as arriving:
             for rows in frame.bands(self):
                 passes.fullscreen(program, arriving, rows=rows, **bindings)

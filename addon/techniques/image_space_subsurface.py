@@ -41,7 +41,8 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import diffusion
 from ..lighting import leaving_light, repeated_light, walked_light
-from ..lighting.leaving_light import LeavingLight, LeavingService, sending
+from ..lighting.asked import asked
+from ..lighting.leaving_light import LeavingLight, LeavingService
 from ..lighting.point_light import LIGHTING, PointLight
 from ..lighting.visibility import RAYS, ray_bindings
 from ..materials import translucency
@@ -283,7 +284,7 @@ class ImageSpaceSubsurface(Technique):
             return
         offered = provided.bindings
         textures = {name: offered["textures"][name] for _, name in GATHER_TEXTURES}
-        program = sending(frame, INDIRECT, textures)
+        program = asked(frame, INDIRECT, textures)
         names = {name for _, name in GATHER_CONSTANTS} - {"lobe_rays"}
         passes.fullscreen(
             program, target,

@@ -43,7 +43,7 @@ from ..gfx import images, passes
 from ..gfx.interface import answered
 from ..gfx.library import Program
 from ..lighting import surfels as surfel_light
-from ..lighting.leaving_light import lit_at_hits
+from ..lighting.asked import lit_at_hits
 from ..lighting.media import MEDIA, MediaService
 from ..lighting.surfels import SurfelLight
 from ..lighting.virtual_lights import VirtualLights

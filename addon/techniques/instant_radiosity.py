@@ -45,7 +45,7 @@ from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from ..lighting.leaving_light import lit_at_hits
+from ..lighting.asked import lit_at_hits
 from ..lighting.path_sources import shaded_roughness
 from ..lighting.virtual_lights import (
     PATH_BLOCKS,

@@ -42,7 +42,7 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import lists
 from ..lighting import micro_buffers
-from ..lighting.media import dimmed
+from ..lighting.asked import asked
 from ..lighting.micro_buffers import (
     BUFFER_CONSTANTS,
     BUFFER_DEFINES,
@@ -246,7 +246,7 @@ class MicroRendering(MultiresRadiosity):
         self, frame: Frame, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
     ) -> Iterator[None]:  # fmt: skip
         """Block after block, so that micro-buffers take little memory, fit an image, and no dispatch takes long."""
-        program = dimmed(frame, program, textures := dict(textures))
+        program = asked(frame, program, textures := dict(textures))
         side, leaves = (bindings["constants"][name] for name in ("micro_side", "leaf_count"))
         width, height = size
         columns = min(WIDEST // side, width)

@@ -42,8 +42,7 @@ from ..frame.technique import Param
 from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..kernels import lists
-from ..lighting.leaving_light import lit_at_hits
-from ..lighting.media import dimmed
+from ..lighting.asked import asked, lit_at_hits
 from ..lighting.virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -328,7 +327,7 @@ class MultiresRadiosity(InstantRadiosity):
     ) -> Iterator[None]:
         columns = lists.columns(frame.size, 8)
         textures = bindings["textures"] | bound.textures | listed
-        program = dimmed(frame, regions(bound.gather), textures)
+        program = asked(frame, regions(bound.gather), textures)
         constants = bindings["constants"] | bound.constants | grid | {"columns": columns}
         for first, last in frame.bands(self, "regions"):
             passes.compute(
@@ -342,7 +341,7 @@ class MultiresRadiosity(InstantRadiosity):
     ) -> Iterator[None]:
         """The same level by level, without a list; with no levels, all pixels."""
         levels = len(flags)
-        program = dimmed(frame, regions(bound.gather, listed=False), textures := {})
+        program = asked(frame, regions(bound.gather, listed=False), textures := {})
         anything = bindings["textures"]["virtual_lights"]  # for what a level does not look at
         for level in range(levels, -1, -1):
             width, height = _level_size(frame.size, level, levels)

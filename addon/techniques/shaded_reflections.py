@@ -38,13 +38,13 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting import caustic_maps
+from ..lighting.asked import asked
 from ..lighting.caustic_casters import bright_world, meshes_answered
 from ..lighting.caustic_maps import CausticMaps
 from ..lighting.glass_interfaces import clear_roughness
-from ..lighting.leaving_light import sending
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import CANDIDATES
-from ..lighting.media import LightOfMedia, MediaService, Rays, dimmed
+from ..lighting.media import LightOfMedia, MediaService, Rays
 from ..lighting.path_sources import SHOWN, SHOWN_THROUGH, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
@@ -439,8 +439,7 @@ class ShadedReflections(Technique, BothWays):
         if provided is not None:
             near = {name: provided.bindings["constants"][name] for name in near}
             textures = {name: provided.bindings["textures"][name] for name in textures}
-        program = sending(frame, received_program(self._sources.kinds, transmission, frame.materials.soft), textures)
-        program = dimmed(frame, program, textures)
+        program = asked(frame, received_program(self._sources.kinds, transmission, frame.materials.soft), textures)
         passes.fullscreen(
             program,
             self._target(transmission, ("indirect",), records.target.depth),

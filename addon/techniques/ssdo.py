@@ -40,7 +40,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting.leaving_light import lit_at_hits
+from ..lighting.asked import lit_at_hits
 from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights
 from ..scene import acceleration
 from ..scene.view import VIEW

@@ -33,9 +33,9 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import passes
 from ..lighting import linked, repeated_light
+from ..lighting.asked import asked
 from ..lighting.light_rates import EmissivePoints, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, TRACED_DEFINES
-from ..lighting.media import dimmed
 from ..lighting.path_sources import shaded_roughness
 from ..lighting.repeated_light import Lit
 from ..lighting.visibility import TracedLobes
@@ -136,7 +136,7 @@ class TracedGlossy(Technique):
                 "glass_bends": int(refracts(frame)),
             },
         }  # fmt: skip
-        program = dimmed(frame, TRACED, bindings["textures"])
+        program = asked(frame, TRACED, bindings["textures"])
         program = linked.linked(frame, self, program, self._rows, bindings["textures"])
         yield from repeated_light.add(frame, self, self._sources, Lit(program, NARROW_LOBE, bindings, self._rows))
         frame.count(self, "passes")

@@ -40,8 +40,9 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..lighting.asked import asked
 from ..lighting.glass_interfaces import clear_roughness, upload_interfaces
-from ..lighting.media import MediaService, dimmed
+from ..lighting.media import MediaService
 from ..lighting.path_sources import SHOWN_THROUGH, PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
@@ -157,7 +158,7 @@ class TracedRefraction(Technique):
         if frame.service(ShadedLobes) is None:
             self._walk(frame, bindings)
         else:
-            self._draw(frame, dimmed(frame, FIRST_ALONE, bindings["textures"]), bindings)
+            self._draw(frame, asked(frame, FIRST_ALONE, bindings["textures"]), bindings)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
 
