@@ -187,11 +187,4 @@ class CANDELA_CAMERA_PT_eye_pictures(bpy.types.Panel):
 _CLASSES = (CANDELA_OT_eye_preset, CANDELA_OT_eye_pictures, CANDELA_CAMERA_PT_eye_pictures)
 
 
-def register() -> None:
-    for made in _CLASSES:
-        bpy.utils.register_class(made)
-
-
-def unregister() -> None:
-    for made in reversed(_CLASSES):
-        bpy.utils.unregister_class(made)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -61,11 +61,4 @@ def device_lines() -> list[str]:
 _CLASSES = (CANDELA_OT_measure_device, CandelaPreferences)
 
 
-def register() -> None:
-    for made in _CLASSES:
-        bpy.utils.register_class(made)
-
-
-def unregister() -> None:
-    for made in reversed(_CLASSES):
-        bpy.utils.unregister_class(made)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)
