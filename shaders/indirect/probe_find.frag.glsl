@@ -10,7 +10,7 @@
 #include "indirect/probe_cell.glsl"
 
 #define MOST_MIRRORS 4  // one behind another, that a probe looks at
-#define MOVED 8u
+#define MOVED 16u
 #define WIDE_LOBE 0.55  // roughness from which a lobe sends its light about as far around as a virtual light does
 
 struct Probe {
