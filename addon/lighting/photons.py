@@ -17,7 +17,8 @@ between mirrored and bent at later interfaces (in proportion to Fresnel's reflec
 samples that have photons). So the photons of a sample are one smooth map, which needs few of them, and the mean over
 the samples is the integral over light, lobes and paths. The
 grid is shifted below a texel in each sample and k falls with their number, so that the mean converges. `blur` is what
-the light's extent and the lobe's width, which the samples share out, leave to each: at one sample all of it.
+the light's extent and the lobe's width, which the samples share out, leave to each: at one sample all of it; their
+points lie so much nearer to the light's middle.
 
 | cost | per sample, view and lobe |
 |---|---|
@@ -157,6 +158,16 @@ def _half_width(emitter: lights.Emitter) -> float:
     return float(np.sqrt(emitter.area / np.pi)) if emitter.has_span else emitter.radius
 
 
+def drawn_in(emitter: lights.Emitter, sample: np.ndarray, count: int) -> np.ndarray:
+    """One of `count` points of a lamp, nearer to its middle: each is blurred by the lamp's width over the root of their
+    number, so that all together are as wide as the lamp. Points of meshes and of the world stay."""
+    if emitter.light is None:
+        return sample
+    middle = emitter.middle()
+    moved = middle + np.sqrt(1.0 - 1.0 / max(count, 1)) * (sample - middle)
+    return moved / np.linalg.norm(moved) if emitter.kind == lights.SUN else moved
+
+
 def lattice(k: int, count: int) -> float:
     """Number `k` of `count` at equal distances in 0..1, in an order that leaves no gap for long: steps of about the
     golden section."""
@@ -227,7 +238,7 @@ class Photons:
             for number in range(index * parts, (index + 1) * parts):
                 middle = alone and parts == 1
                 drawn = frame.random_volume("light", number, evenly=parts > 1 and emitter.is_flat)
-                sample = emitter.middle() if middle else emitter.sample(*drawn)
+                sample = emitter.middle() if middle else drawn_in(emitter, emitter.sample(*drawn), count * parts)
                 shift = frame.random("caustics/grid", number)
                 for low, high in boxes:
                     for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):
