@@ -15,10 +15,9 @@ differentials on a grid, Kim, Ray Tracing Gems 2019):
 All photons of a sample share the point of the light, the numbers that a rough lobe draws from, and those that choose
 between mirrored and bent at later interfaces (in proportion to Fresnel's reflectance, and shared out evenly over the
 samples that have photons). So the photons of a sample are one smooth map, which needs few of them, and the mean over
-the samples is the integral over light, lobes and paths. The
-grid is shifted below a texel in each sample and k falls with their number, so that the mean converges. `blur` is what
-the light's extent and the lobe's width, which the samples share out, leave to each: at one sample all of it; their
-points lie so much nearer to the light's middle.
+the samples is the integral over light, lobes and paths. The grid is shifted below a texel in each sample and k falls
+with their number, so that the mean converges. `blur` is what the light's extent and the lobe's width, which the samples
+share out, leave to each: at one sample all of it; points of a light lie so much nearer to its middle.
 
 | cost | per sample, view and lobe |
 |---|---|
