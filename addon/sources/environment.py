@@ -55,6 +55,7 @@ class Environment:
             map_options=(float(transparent_film), 0, 0, 0),
         )  # fmt: skip
         self._openness: np.ndarray | None = None  # of the cells of light
+        self.open_share = 1.0  # of the world's light, how much reaches what the camera sees, as `guide` was told
         self._known: tuple[images.Image, int] | None = None
         self._set_density(density)
 
@@ -96,8 +97,10 @@ class Environment:
         still drawn. None: back to radiance alone. `openness`, of the same cells: the mean of visibility over probes
         that face them.
         """
-        self._known, self._openness = None, None
+        self._known, self._openness, self.open_share = None, None, 1.0
         if openness is not None:
+            seen = self._by_radiance * openness[self._guide_cells()]
+            self.open_share = float((seen * self._cell_solid_angle(*seen.shape)).sum())
             self._openness = _between_cells(openness, self._light_cells.centres() @ self._to_world.T)
         if usefulness is None:
             if self.density is not self._by_radiance:
@@ -143,33 +146,40 @@ class Environment:
     def _set_density(self, density: np.ndarray) -> None:
         self.density = density
         self.density_map = images.upload(density.astype(np.float32), "R32F")
-        height, width = density.shape
-        edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
-        mass = density * self._cell_solid_angle(height, width)
-        self._edges = edges
-        self._cells = np.concatenate([[0.0], np.cumsum(mass)])
-        self._rows = self._cells[::width]
+        height = len(density)
+        self._edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
+        self._sums = self._running_sums(density)
 
-    def draw(self, x, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _running_sums(self, density: np.ndarray) -> np.ndarray:
+        """Of the shares of cells, row after row, from 0 on."""
+        return np.concatenate([[0.0], np.cumsum(density * self._cell_solid_angle(*density.shape))])
+
+    @cached_property
+    def _sums_by_radiance(self) -> np.ndarray:
+        return self._running_sums(self._by_radiance)
+
+    def draw(self, x, y, guided: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """From uniform numbers of any shape: directions (..., 3), unit, in the world; radiance from there (..., 3), and
-        densities per steradian (...)."""
-        height, width = self.density.shape
-        x, y = np.asarray(x, np.float64), np.asarray(y, np.float64) * self._rows[-1]
-        row = np.clip(np.searchsorted(self._rows, y, side="right") - 1, 0, height - 1)
-        low, mass = self._rows[row], self._rows[row + 1] - self._rows[row]
+        densities per steradian (...). Not `guided`: by radiance alone, the same whatever the camera sees."""
+        density, cells = (self.density, self._sums) if guided else (self._by_radiance, self._sums_by_radiance)
+        height, width = density.shape
+        rows = cells[::width]
+        x, y = np.asarray(x, np.float64), np.asarray(y, np.float64) * rows[-1]
+        row = np.clip(np.searchsorted(rows, y, side="right") - 1, 0, height - 1)
+        low, mass = rows[row], rows[row + 1] - rows[row]
         along = (y - low) / np.maximum(mass, 1e-300)
         place = low + x * mass  # on the curve that runs through one row after the other
-        column = np.searchsorted(self._cells, place, side="right") - 1 - row * width
+        column = np.searchsorted(cells, place, side="right") - 1 - row * width
         column = np.clip(column, 0, width - 1)
-        start = self._cells[row * width + column]
-        across = (place - start) / np.maximum(self._cells[row * width + column + 1] - start, 1e-300)
+        start = cells[row * width + column]
+        across = (place - start) / np.maximum(cells[row * width + column + 1] - start, 1e-300)
         z = self._edges[row] + np.clip(along, 0, 1) * (self._edges[row + 1] - self._edges[row])
         azimuth = (0.5 - (column + np.clip(across, 0, 1)) / width) * 2 * np.pi
         ring = np.sqrt(np.maximum(1.0 - z * z, 0.0))
         in_map = np.stack([ring * np.cos(azimuth), ring * np.sin(azimuth), z], axis=-1)
         direction = in_map @ self._to_world.T
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-        return direction, self.lookup(in_map) * self.color, self.density[row, column]
+        return direction, self.lookup(in_map) * self.color, density[row, column]
 
     def lookup(self, in_map: np.ndarray) -> np.ndarray:
         """Bilinear radiance (..., 3), without the factor, in directions (..., 3) of the map's own frame."""

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from addon.lighting.maps_or_rays import Compared
+from addon.sources import environment
 from addon.sources.rates import Rate
 from addon.techniques import environment_light
 from tests.techniques.conftest import places
@@ -250,3 +251,23 @@ def test_the_camera_sees_the_texel_that_it_looks_at(stage, turn):
     stage.camera((0, 0, 0), (np.pi / 2, 0, turn - np.pi / 2), angle=0.05)
     seen = stage.render(size=(8, 8))["environment"].mean(axis=(0, 1))
     assert seen == pytest.approx((2 + np.cos(turn), 2 + np.sin(turn), 0), abs=0.02)
+
+
+def test_directions_that_are_not_guided_are_the_same_whatever_the_camera_sees(stage):
+    """Those of bounced light, in the open: guided by what the camera's places see they would move with it."""
+    stage.floor()
+    stage.world((0.25, 0.5, 1.0))
+    stage.camera_above()
+    stage.render(size=(8, 8), bounces=1)
+    world = stage.renderer.frame.environment
+    numbers = np.random.default_rng(1).random((2, 64))
+    plain = world.draw(*numbers, guided=False)
+    for half in (slice(0, environment.GUIDE_ROWS // 2), slice(environment.GUIDE_ROWS // 2, None)):
+        seen = np.zeros((environment.GUIDE_ROWS, environment.GUIDE_COLUMNS))
+        seen[half] = 1.0
+        world.guide(seen, seen)
+        assert world.open_share == pytest.approx(0.5, abs=0.02)
+        assert all(np.array_equal(one, other) for one, other in zip(world.draw(*numbers, guided=False), plain))
+        assert not np.allclose(world.draw(*numbers)[0], plain[0])
+    world.guide(None)
+    assert np.array_equal(world.draw(*numbers)[0], plain[0]) and world.open_share == 1.0
