@@ -28,6 +28,7 @@ from ..snapshot.scene import Note
 from ..surfaces.draw import SURFACE_TEXTURES
 
 OPEN = "film.open"
+APART = 1 << 16  # numbers of directions of a sample's points: each is stratified over samples, slices and time steps
 CAST = passes.fullscreen_program(
     "ambient occlusion",
     "occlusion/open.frag.glsl",
@@ -49,7 +50,7 @@ class AmbientOcclusion(Technique):
         return None if snapshot.film.open_within is not None else "the view layer asks for no Ambient Occlusion"
 
     def begin(self, frame: Frame) -> None:
-        self._number = 0
+        self._points = (-1, 0)  # of which sample how many points are drawn
         frame.held.add(Write(OPEN, "RGBA32F", "How open what is seen is to what lies around", True))
         if frame.hierarchy("shadow") is None:
             text = "it is 1 everywhere: the scene has more triangles than rays can be cast among."
@@ -57,7 +58,9 @@ class AmbientOcclusion(Technique):
         frame.provide(Openness(self._draw))
 
     def _draw(self, frame: Frame, surfaces: dict, place: tuple[float, float], share: float) -> None:
-        hierarchy = frame.hierarchy("shadow")
+        hierarchy, (sample, point) = frame.hierarchy("shadow"), self._points
+        point = point if sample == frame.sample else 0
+        self._points = frame.sample, point + 1
         with images.borrowed(*frame.size, "RGBA32F") as drawn:
             if hierarchy is None:
                 drawn.clear((1.0, 1.0, 1.0, 1.0))
@@ -66,9 +69,8 @@ class AmbientOcclusion(Technique):
                     CAST, drawn, textures={**surfaces, **hierarchy.textures}, blocks={"film_view": frame.view_block},
                     constants={
                         "farthest": frame.snapshot.film.open_within, "offset_size": frame.offset_size,
-                        "point_number": self._number,
+                        "point_number": point * APART + frame.sample,
                     },
                 )  # fmt: skip
                 frame.count(self, "rays", frame.size[0] * frame.size[1])
-            self._number += 1
             frame.count(self, "passes", 1 + film_filter.add(frame, {OPEN: drawn.colors[0]}, place, share))
