@@ -84,12 +84,16 @@ def empty_scene():
 
 @pytest.fixture(autouse=True)
 def few_programs():
-    """Programs that tests compile without a picture would stay until one begins: some 4 MB each of a software GPU, and
-    a process of them grew to 4 GB."""
+    """Programs that tests compile without a picture would stay until one begins, and those that were drawn outside of
+    final renders until something is drawn there again: 4 MB each, and a process of them grew to 4 GB."""
     yield
     library = sys.modules.get("addon.gfx.library")
-    if library is not None and library.kept() > 2 * library.MOST_PROGRAMS:
+    if library is None:
+        return
+    if library.kept() > 2 * library.MOST_PROGRAMS:
         library._release()
+    elif len(library._dropped) > library.MOST_PROGRAMS // 4:
+        library._free_dropped()
 
 
 @pytest.fixture(scope="module", autouse=True)
