@@ -7,13 +7,14 @@ software driver is most; it depends on the machine's load far less than seconds 
 because a finished picture is kept. Beside it stands the error of both, the mean over the runs of relMSE beside Cycles.
 
 `--drafts` adds drafts of a viewport of 96x64 pixels that turns, and for which time stands still. `--keep` appends the
-means, with the names of both commits, to bench/results/beside.json: the last ten commits that mattered.
+means, with the names of both commits, to bench/results/beside.json, scene by scene: the last ten commits that mattered.
 Quick, while something is being changed: `--only cornell_box columns --samples 16 --runs 1 --truth 0`.
 """
 
 from __future__ import annotations
 
 import argparse
+import datetime as dt
 import json
 import subprocess
 import sys
@@ -208,12 +209,14 @@ def commit_of(tree: Path) -> str:
     return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip()
 
 
-def keep(rows: list[Row], options: argparse.Namespace) -> None:
-    """Append to the history, of which the last KEPT stay."""
+def keep(rows: list[Row], options: argparse.Namespace, began: str) -> None:
+    """Append to the history, of which the last KEPT stay, or replace what this run, which `began` then, has kept: one
+    that is ended early leaves the scenes that it has measured."""
     before = json.loads(HISTORY.read_text(encoding="utf-8")) if HISTORY.is_file() else []
+    before = [one for one in before if one.get("began") != began]
     one = {
-        "made": now(), "this": commit_of(ROOT), "other": commit_of(options.checkout), "size": list(options.size),
-        "means": summary(rows), "rows": [list(cells(row)) for row in rows],
+        "made": now(), "began": began, "this": commit_of(ROOT), "other": commit_of(options.checkout),
+        "size": list(options.size), "means": summary(rows), "rows": [list(cells(row)) for row in rows],
     }  # fmt: skip
     write_whole(HISTORY, json.dumps([*before, one][-KEPT:], indent=1, ensure_ascii=False) + "\n")
 
@@ -259,6 +262,7 @@ def command(options: argparse.Namespace) -> int:
         except ValueError as error:
             print(error, file=terminal)
             return 2
+        began = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
         versions = Version(options.checkout.resolve()), Version(ROOT)
         rows, failed = [], []
         print(*HEAD, sep=", ", file=terminal, flush=True)
@@ -271,11 +275,11 @@ def command(options: argparse.Namespace) -> int:
                     failed.append(str(error))
                     continue
                 print(*cells(rows[-1]), sep=", ", file=terminal, flush=True)
+            if options.keep and rows:
+                keep(rows, options, began)
         for version in versions:
             version.end()
     print(table([HEAD, *map(cells, rows)]), "", *map(sentence, summary(rows)), *failed, sep="\n")
     slower = [f"{row.scene} ({row.samples})" for row in rows if row.ratio > MOST]
     print(f"Slower by more than {100 * (MOST - 1):.0f} %: {', '.join(slower) or 'none'}.")
-    if options.keep and rows:
-        keep(rows, options)
     return 0

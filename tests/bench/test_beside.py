@@ -32,9 +32,12 @@ def test_rows_as_cells():
 def test_history_keeps_the_last(tmp_path, monkeypatch):
     monkeypatch.setattr(beside, "HISTORY", tmp_path / "beside.json")
     options = argparse.Namespace(checkout=tmp_path, size=(16, 12))
-    for _ in range(beside.KEPT + 2):
-        beside.keep(rows(), options)
-    assert len(json.loads(beside.HISTORY.read_text(encoding="utf-8"))) == beside.KEPT
+    for number in range(beside.KEPT + 2):
+        beside.keep(rows(), options, str(number))
+    beside.keep(rows()[:1], options, str(number))  # the same run, further on
+    kept = json.loads(beside.HISTORY.read_text(encoding="utf-8"))
+    assert [one["began"] for one in kept] == [str(number) for number in range(2, beside.KEPT + 2)]
+    assert [len(one["rows"]) for one in kept[-2:]] == [3, 1]
 
 
 @pytest.mark.parametrize("name", beside_scenes.SCENES)
