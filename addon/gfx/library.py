@@ -37,7 +37,6 @@ _FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D")
 _FORMATS |= dict.fromkeys(("RGBA32UI", "R32UI"), "UINT_2D")
 _SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D", *_FORMATS}
 MOST_TEXTURES = 16  # of a program
-SHORT = 12_000  # characters of a source, below which its compiler takes longer than what it draws
 _MOST_IMAGES = 8  # that Blender binds at once
 _CONSTANTS = {"FLOAT", "VEC2", "VEC3", "VEC4", "INT", "IVEC2", "IVEC4", "MAT4", "BOOL"}
 _PUSH_BYTES = {"FLOAT": 4, "VEC2": 8, "VEC3": 16, "VEC4": 16, "INT": 4, "IVEC2": 8, "IVEC4": 16, "MAT4": 64, "BOOL": 4}
@@ -380,8 +379,7 @@ def _compile(program: Program):
             info.fragment_out(slot, kind, name)
         sources = [used(program.vertex), used(program.fragment)]
         info.vertex_source(sources[0][0])
-        text = sources[1][0]
-        info.fragment_source(_once(text) if len(text) < SHORT and loads_beat_fetches() else text)
+        info.fragment_source(sources[1][0])
 
     with _CapturedOutput() as captured:
         try:
@@ -392,13 +390,6 @@ def _compile(program: Program):
     if failure is not None:
         raise ShaderError(_explain(program, captured.text, sources)) from failure
     return handle
-
-
-def _once(text: str) -> str:
-    """A short fragment shader that a rasteriser in software compiles once. It compiles one that writes all that it
-    covers a second time, for tiles that are covered wholly, which spares the long ones some hundredths of their time;
-    not one that may discard a pixel. This one never does."""
-    return text.replace("void main()\n{", "void main()\n{ if (gl_FragCoord.x < 0.0) { discard; }", 1)
 
 
 def _explain(program: Program, log: str, sources: list[tuple[str, list[tuple[str, int]]]]) -> str:
