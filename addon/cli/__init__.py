@@ -50,7 +50,7 @@ def main(arguments: list[str], program: str = f"blender --command {COMMAND}") ->
     except Refused as refusal:
         return _end(str(refusal), refusal.code)
     except KeyboardInterrupt:
-        return _end("Interrupted; nothing was written.", FAILURE)
+        return _end("Interrupted; what was unfinished was not written, and what was finished before stays.", FAILURE)
     except BrokenPipeError:  # `… | head`: who reads has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), STDOUT)
         return FAILURE
@@ -89,7 +89,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     shared.add_argument("--view-layer", metavar="NAME", help="default: all that are rendered; compare: the active one")
     shared.add_argument(
         "--set", metavar="NAME=VALUE", action="append", default=[], dest="assignments",
-        help=f"a setting of Candela, such as {_example()}; may be repeated; a wrong name gets the list",
+        help=f"a setting of Candela, such as {_example()}; may be repeated; a wrong name prints the list",
     )  # fmt: skip
     shared.add_argument(
         "--run-scripts", action="store_true",
@@ -104,19 +104,19 @@ def _parser(program: str) -> argparse.ArgumentParser:
     render.add_argument("--output", metavar="PATH", type=Path, help=".png, or .exr with all passes of the file")
     render.add_argument(
         "--compositing", action="store_true",
-        help="run the file's compositor; its File Output nodes write below the folder of the output, or not at all",
+        help="run the file's compositor; File Output nodes that point outside the output's folder are muted",
     )  # fmt: skip
     render.add_argument(
         "--frames", metavar="A-B", type=_frames,
         help="several frames, such as 1-10, 1-100:5 or 1,3,7; the name of the output has #### for their number",
     )  # fmt: skip
-    render.add_argument("--show", metavar="IMAGE", help="one of the images by which the picture is made in its place")
+    render.add_argument("--show", metavar="IMAGE", help="write this intermediate image in place of the picture")
     render.add_argument("--slice", metavar="K/N", help="the Kth of N parts of the samples, as .exr; see merge")
     _add_farming(render)
     render.set_defaults(verb=verbs.render, opens=True)
     merge = commands.add_parser("merge", help="make a picture of its slices", allow_abbrev=False)
     merge.add_argument("slices", metavar="SLICE.exr", type=Path, nargs="+", help="all slices of one picture")
-    merge.add_argument("--file", metavar="FILE.blend", type=Path, help="the file of which these are slices")
+    merge.add_argument("--file", metavar="FILE.blend", type=Path, help="the file that was rendered (needed)")
     merge.add_argument("--output", metavar="PATH", type=Path, required=True, help=".png, or .exr with all passes")
     merge.add_argument("--frames", metavar="A-B", type=_frames, help="several pictures; names have #### for the frame")
     merge.add_argument("--run-scripts", action="store_true", help="as for render")
@@ -126,8 +126,10 @@ def _parser(program: str) -> argparse.ArgumentParser:
     merge.set_defaults(verb=merging.merge, opens=False)
     job = commands.add_parser("farm", help="write a job for a render farm", **add)
     job.add_argument("--frames", metavar="A-B", type=_frames, help="default: the file's range")
-    job.add_argument("--chunk", metavar="N", type=_count, default=1, help="frames of a task (default 1)")
-    job.add_argument("--split-samples", metavar="N", type=_count, default=1, help="slices of a picture (default 1)")
+    job.add_argument("--chunk", metavar="N", type=_count, default=1, help="frames per task (default 1)")
+    job.add_argument(
+        "--split-samples", metavar="N", type=_count, default=1, help="slices per picture, a task each (default 1)"
+    )
     job.add_argument("--output", metavar="FOLDER", type=Path, required=True, help="for the job's description")
     job.add_argument("--results", metavar="FOLDER", type=Path, help="for the pictures (default: in the job's folder)")
     job.add_argument("--format", choices=("png", "exr"), default="exr", help="of the pictures (default exr)")
@@ -141,7 +143,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
         metavar="N",
         type=_count,
         default=256,
-        help="of Cycles, each of two renders (default 256)",
+        help="samples of each of the two Cycles renders (default 256)",
     )
     against.add_argument(
         "--direct-only", action=argparse.BooleanOptionalAction, default=False,
@@ -149,7 +151,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     )  # fmt: skip
     against.add_argument(
         "--first-row", action="store_true",
-        help="begin the page with 1, 4 and 16 samples, and Cycles denoised in the time of the last",
+        help="begin the page with 1, 4 and 16 samples of Candela, and denoised Cycles in the time of the 16",
     )  # fmt: skip
     against.add_argument("--progress", action="store_true", help="print lines of progress, as render does for farms")
     against.add_argument("--no-cache", action="store_true", help="render the reference anew and do not keep it")
@@ -159,11 +161,25 @@ def _parser(program: str) -> argparse.ArgumentParser:
     plan.set_defaults(verb=verbs.plan, opens=True)
     tune = commands.add_parser("tune", help="find the settings with the least error within a time", **add)
     tune.add_argument(
-        "--milliseconds", metavar="N", type=_positive, required=True, help="that a picture may take on this machine"
+        "--milliseconds",
+        metavar="N",
+        type=_positive,
+        required=True,
+        help="render time allowed per picture, on this machine",
     )
-    tune.add_argument("--budget", metavar="SECONDS", type=_positive, default=120.0, help="to measure in (default 120)")
     tune.add_argument(
-        "--reference-samples", metavar="N", type=_count, default=128, help="of Cycles, each of two (default 128)"
+        "--budget",
+        metavar="SECONDS",
+        type=_positive,
+        default=120.0,
+        help="time for measuring, beside the reference (default 120)",
+    )
+    tune.add_argument(
+        "--reference-samples",
+        metavar="N",
+        type=_count,
+        default=128,
+        help="samples of each of two Cycles renders (default 128)",
     )
     tune.add_argument("--apply", action="store_true", help="write what was found into the file, or into --output")
     tune.add_argument("--output", metavar="PATH.blend", type=Path, help="with --apply: leave FILE as it is")
@@ -177,13 +193,15 @@ def _parser(program: str) -> argparse.ArgumentParser:
 
 def _add_farming(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--progress", action="store_true", help="print lines of progress that render farms read")
-    parser.add_argument("--expect", metavar="VERSION", help="end at once unless this Blender has it, such as 5.2")
+    parser.add_argument(
+        "--expect", metavar="VERSION", help="exit with code 1 unless Blender's version begins so, such as 5.2"
+    )
 
 
 def _add_cache(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cache", metavar="FOLDER", type=Path,
-        help=f"for references, up to {LIMIT_BYTES >> 30} GiB (default: {cache_folder()})".replace("%", "%%"),
+        help=f"keeps Cycles' references, up to {LIMIT_BYTES >> 30} GiB (default: {cache_folder()})".replace("%", "%%"),
     )  # fmt: skip
 
 

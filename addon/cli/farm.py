@@ -98,7 +98,7 @@ def launch() -> list[str]:
 def template(name: str, parts: list[str], start: list[str], options) -> dict:
     """The job template, as plain data."""
     suffix, split = options.format, options.split_samples
-    common = ["--progress", "--expect", ".".join(map(str, bpy.app.version[:2]))]
+    common = ["--progress", "--expect", ".".join(map(str, bpy.app.version[: 3 if options.split_samples > 1 else 2]))]
     common += ["--run-scripts"] if options.run_scripts else []
     chosen = []
     for flag, value in (

@@ -29,7 +29,7 @@ import bpy
 from .refused import Refused
 
 Sentences = list[str]
-TRUST = "--run-scripts trusts the file"
+TRUST = "if you trust the file, --run-scripts runs them"
 
 
 def contain(compositing: bool) -> Sentences:
@@ -91,7 +91,7 @@ def refuse_inputs(outputs: list[Path]) -> None:
     ]
     for path in outputs:
         if path.resolve() in read or any(_of_sequence(path.resolve(), first) for first in numbered):
-            raise Refused(f"{path} is part of what is rendered, and is not replaced; choose another output.")
+            raise Refused(f"{path} is an input of the scene and is not replaced; choose another output.")
 
 
 def _of_sequence(path: Path, first: Path) -> bool:
@@ -120,7 +120,7 @@ def file_outputs_held(scene, folder: Path, temporary: Path) -> Iterator[Sentence
             if wanders or "{" in where or not place.is_relative_to(folder):
                 node.mute = True
                 said.append(
-                    f"File Output node '{node.name}' points to {where or names[0]}, not below {folder}; it is mute."
+                    f"File Output node '{node.name}' points to {where or names[0]}, not below {folder}; it was muted."
                 )
             else:
                 aimed = str(temporary / place.relative_to(folder))

@@ -93,7 +93,7 @@ def expect(version: str | None) -> None:
     """Raise Refused unless this Blender has the version, compared in as many places as are given ("5.2")."""
     here = ".".join(map(str, bpy.app.version))
     if version is not None and f"{here}.".find(f"{version}.") != 0:
-        raise Refused(f"This is Blender {here}, and the job was made for {version}: give the node that version.")
+        raise Refused(f"This is Blender {here}, and the job was made for {version}: install that version on this node.")
 
 
 def open_mainfile(path: Path, run_scripts: bool = False) -> str:
@@ -230,7 +230,7 @@ def _print_ledger() -> None:
 
 def _print_held_back(sentences) -> None:
     if sentences:
-        print("Held back of what the file would do beside the picture:")
+        print("Blocked or left out of the file, for safety:")
     for sentence in dict.fromkeys(sentences):
         print(f"  {one_line(sentence)}")
 
@@ -238,7 +238,7 @@ def _print_held_back(sentences) -> None:
 def _print_notes(notes) -> None:
     texts = dict.fromkeys(str(note) for note in notes)
     if texts:
-        print("Drawn otherwise than in Cycles:")
+        print("Rendered differently from Cycles:")
     for text in texts:
         print(f"  {one_line(text)}")
 

@@ -47,8 +47,8 @@ ServiceT = TypeVar("ServiceT", bound=Service)
 SharedT = TypeVar("SharedT")
 
 FOOTPRINT = 0.96  # side of a square that deviates as much as a pixel filter of half width 1
-FAR_BEYOND = 300.0  # by the typical distance of what is seen
-ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
+FAR_BEYOND = 300.0  # typical distances of what is seen
+ORTHOGRAPHIC_DISTANCE = 1.4  # widths of what is seen: a lens of 50 mm before a sensor of 36 mm
 
 
 @dataclass
@@ -76,10 +76,10 @@ class Frame:
     tiles: list[panorama.Tile] = field(default_factory=list)  # by which a panoramic camera is drawn; else none
     sample: int = 0  # the sample that is running
     at: str = ""  # label of the technique that is at work, or was last
-    film_points: int = 1  # that a sample shows; the surface technique says it before it looks
+    film_points: int = 1  # of each sample (film/points.py); the surface technique sets it before it calls `look`
     samples_done: int = 0
     part_done: float = 0.0  # of the first sample, what its sums hold already and can be shown
-    numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice
+    numbers: tuple[int, ...] | None = None  # of the samples to draw; None: those of the settings' slice
     first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
     drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
     find_receivers: Callable[[], Receivers] | None = None
@@ -119,15 +119,15 @@ class Frame:
 
     @property
     def receivers(self) -> Receivers | None:
-        """Boxes around what the camera sees; None where no technique finds any. The first question may wait for the
-        GPU: what can be drawn before is."""
+        """Boxes around what the camera sees; None where no technique finds any. The first access may wait for a
+        readback from the GPU, so draw first what does not depend on it."""
         if self._receivers is None and self.find_receivers is not None:
             self._receivers, self.find_receivers = self.find_receivers(), None
         return self._receivers
 
     @cached_property
     def emitters(self) -> list[Emitter]:
-        """The scene's lights that give something, in an order of their own."""
+        """The scene's lights of nonzero power, sorted so that neither names nor their order in the scene matter."""
         return emitters(self.snapshot, self.geometry.origin, self.lamp_maps)
 
     def random(self, use: str, at: int | None = None) -> tuple[float, float]:
@@ -136,7 +136,7 @@ class Frame:
         return point(self.sample if at is None else at, use, self.settings.seed)
 
     def uniform(self, use: str) -> float:
-        """A number of this sample that chooses among things, of which the chosen one then draws a point."""
+        """A number in 0..1 of this sample to choose one of several things by; `random` then gives a point on it."""
         return uniform(self.sample, use, self.settings.seed)
 
     def random_volume(self, use: str, at: int | None = None, evenly: bool = False) -> tuple[float, float, float]:
@@ -220,8 +220,9 @@ class Frame:
         return self.measured_emission
 
     def hierarchy(self, path: str = "glossy", passing: frozenset[int] = frozenset()) -> Hierarchy | None:
-        """Triangles that rays of a path (a name of Visibility) can meet, without objects of the groups of blockers
-        `passing` (snapshot/linking.py); None where there are too many. Built on the first call."""
+        """The bounding volume hierarchy of the triangles that rays of a path (a field of snapshot.scene.Visibility, as
+        "shadow") can hit, without objects of the groups of blockers `passing` (snapshot/linking.py); None where the
+        scene has too many triangles. Built on the first call."""
         key = path, passing
         if key not in self._hierarchies:  # to find it again each sample would mean to go through all instances
             self._hierarchies[key] = self.hierarchies.get(self, path, passing)

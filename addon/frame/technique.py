@@ -51,7 +51,7 @@ class Param:
     image: bool = False
     object: bool = False
     file: bool = False
-    draft: bool | int | float | None = None  # its most in a draft: a picture of a moment, as of a view that moves
+    draft: bool | int | float | None = None  # upper bound in a draft: what a viewport shows while the view moves
 
     def check(self, value):
         """`value` in this parameter's type and range, or ValueError with a sentence."""
@@ -111,8 +111,9 @@ def _refuse(value):
 
 @dataclass(frozen=True)
 class Write:
-    """An image that a technique writes. `accumulates`: what techniques draw there adds up, over all samples, or over
-    one where a technique finishes it. `by_need`: it is made only where another technique of the plan writes it, too."""
+    """An image that a technique writes. `accumulates`: techniques blend into it additively; it is cleared before the
+    first sample or, where a technique `finishes` it, by that one after each sample. `by_need`: this declaration alone
+    does not allocate it; another technique of the plan has to write it, too."""
 
     name: str
     format: str
@@ -142,7 +143,7 @@ class Technique:
     params: tuple[Param, ...] = ()
     reads: tuple[str, ...] = ()
     writes: tuple[Write, ...] = ()
-    finishes: tuple[str, ...] = ()  # images that it takes up after all other techniques that write them
+    finishes: tuple[str, ...] = ()  # taken over after each sample: it runs after all that only write them
     provides: tuple[type[Service], ...] = ()
     requests: tuple[type[Service], ...] = ()  # services whose providers run before it in each stage
     remembers: tuple[Write, ...] = ()  # of its writes: the next picture has them as frame.before (history.py)
@@ -154,7 +155,8 @@ class Technique:
         return tuple(param for param in cls.params if param.scope in scopes)
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        """Why this scene does not need the technique, as a sentence; None if it does. Cheap, no GPU."""
+        """Why this scene does not need the technique, as "the world is black", without capital or full stop; None if it
+        does. Must be cheap and must not use the GPU."""
         return None
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
@@ -162,7 +164,8 @@ class Technique:
         return False
 
     def looks_at(self, settings: Settings) -> tuple[str, ...]:
-        """Sums over samples of light paths, colours and normals that it needs by themselves (Held.is_apart)."""
+        """Names of accumulated images (light paths, colours, normals) that it reads one by one. Those that nobody names
+        may be merged into one sum (Held.is_apart)."""
         return ()
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
@@ -183,8 +186,7 @@ class Technique:
 
     @property
     def only_shows(self) -> bool:
-        """Whether it works on the mean of the samples alone: no sample is drawn anew where its parameters change, or
-        the time."""
+        """Whether `show` is its only stage. Then no sample is drawn again when its parameters or the time change."""
         mine = type(self)
         stages = ("begin", "sample", "end")
         return mine.show is not Technique.show and all(getattr(mine, s) is getattr(Technique, s) for s in stages)

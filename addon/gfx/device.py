@@ -1,8 +1,8 @@
 """Measured costs of the device, by which methods are chosen; its name decides nothing.
 
-The figures are measured once (frame/probe.py) and kept by driver and version in the user's folder for caches, so that
-a picture is drawn alike each time. They are rounded, for the same reason. Tests, and whoever wants the choices of
-another machine, set CANDELA_DEVICE to one of MADE_UP or to a JSON file with the fields of `Device`: then nothing is
+The figures are measured once (frame/device_probe.py) and kept by driver and version in the user's folder for caches,
+so that a picture is drawn alike each time. They are rounded, for the same reason. Tests, and whoever wants the choices
+of another machine, set CANDELA_DEVICE to one of MADE_UP or to a JSON file with the fields of `Device`: then nothing is
 measured or kept, and pictures depend on no clock.
 """
 

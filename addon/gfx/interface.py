@@ -1,9 +1,10 @@
-"""What a shader may ask of a scene that not every scene has: an interface, and the same functions where there is none.
+"""Interfaces: features that not every scene has, as media, and that shaders ask without knowing whether this one does.
 
-A source includes `ask/NAME.glsl`, which holds the functions of a scene that has none of it, and calls them without any
-condition. `answered` is the program for a scene that has some: there the include gives the interface's own file, and
-its images are added. So no source and no program is written twice, and what a program asks is known from its text
-(`asked_by`). A program that leaves an interface out says so with its reason, in `Program.leaves_out`.
+A source includes `ask/NAME.glsl`, neutral versions of the functions (no medium: transmittance 1), and calls them
+without any condition. `answered` makes the variant of a program for a scene that has the feature: the include then
+yields the interface's own file, and its images are added to the program's textures. So no source and no program is
+written twice, and which interfaces a program uses follows from its includes (`asked_by`). A program that leaves an
+interface out says so with its reason, in `Program.leaves_out` or in a line `// Leaves out NAME: …` of its shader.
 
 The limit of textures of a program holds for all of its answers together: see tests/gfx/test_interface.py.
 """
@@ -21,8 +22,9 @@ from .library import Program, resolve
 
 @dataclass(frozen=True)
 class Interface:
-    """`glsl`: file with the functions that shaders/ask/NAME.glsl has for scenes without it. `present`: the images of
-    `textures` by name, for a frame; None where it has none."""
+    """`glsl`: the file that replaces the neutral shaders/ask/NAME.glsl and defines the same functions. `textures`:
+    (type, name) of what it reads. `present`: from a frame the images of `textures` by name; None where the frame has
+    nothing of this."""
 
     name: str
     glsl: str
@@ -58,7 +60,8 @@ def answered(program: Program, present: tuple[Interface, ...]) -> Program:
 
 
 def answer(frame: Any, program: Program, textures: dict[str, Image], interfaces: tuple[Interface, ...]) -> Program:
-    """The program for what the frame has of what it asks of these. What it reads then is added to `textures`."""
+    """The variant of a program for a frame: with those of `interfaces` that the program includes and the frame has.
+    Their images are added to `textures`."""
     asked, there = asked_by(program), []
     for one in interfaces:
         found = one.present(frame) if one.asked in asked else None

@@ -18,10 +18,10 @@ _COMPONENTS = {"int": 1, "float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 
 
 class Record:
-    """`texels`: of each vec4 its fields, as "vec3 centre"; integers may share a component from the lowest bits on, as
-    "int kind:4 unlit". `asked`: such texels behind them that are read where they are asked for, as `light_u(light)`.
-    `fetch`: GLSL that reads texel {} of the list. `kinds`: numbered from 0 on; `flags`: bits from the lowest on;
-    `constants`: other numbers that both sides know."""
+    """`texels`: for each vec4 its fields, as "vec3 centre"; integers may share a component from the lowest bits on, as
+    "int kind:4 unlit". `asked`: further texels, which the struct does not hold: each field is fetched by a macro of its
+    own where a shader uses it, as `light_u(light)`. `fetch`: a GLSL expression for texel number {} of the whole list.
+    `kinds`: numbered from 0 on; `flags`: bits from the lowest on; `constants`: other numbers that both sides know."""
 
     def __init__(
         self, name: str, fetch: str, texels: Sequence[Sequence[str]], kinds: Sequence[str] = (),

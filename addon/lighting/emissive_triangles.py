@@ -15,7 +15,7 @@ from ..sources import lights
 
 LONG = 8.0  # squared longest side by area, from which on a triangle is halved; half a square has 4
 LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
-MOST_OWN, NEAR_TILES = 16384, 0.1  # triangles that pixels search; share of what is lit that is near
+MOST_OWN, NEAR_TILES = 16384, 0.5  # triangles that pixels search; share of what is lit that is near
 MOST_SPACED = 256  # points whose distance from each other is measured
 MOST_ASKED = 512  # triangles whose distance from what is lit is measured
 TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
@@ -114,7 +114,7 @@ class EmissiveTriangles:
 
     @property
     def near(self) -> bool:
-        """Whether a tenth of what is lit is so near that points of all would be seen apart."""
+        """Whether half of what is lit is so near that points of all would be seen apart."""
         boxes = self._receivers
         step = -(-len(boxes.distance) // 64)
         low, high = boxes.low[::step, None], boxes.high[::step, None]

@@ -5,9 +5,9 @@ The texels of a light's view of the casters (light_views.py) are photons of the 
     Phi = E(P) * A,   E irradiance across the light's direction at P,  A = d_omega |P - light|^2, or a texel's area
 
 which meet a material's own lobe at P: refracted or mirrored, one grid for each. From there a ray goes on through the
-hierarchy of all triangles, from interface to interface with the means of their materials (interfaces.py), until it
-meets a surface that is no caster. There each photon stands for an ellipse, by its neighbours of the same path (photon
-differentials on a grid, Kim, Ray Tracing Gems 2019):
+hierarchy of all triangles, from interface to interface with the means of their materials (glass_interfaces.py), until
+it meets a surface that is no caster. There each photon stands for an ellipse, by its neighbours of the same path
+(photon differentials on a grid, Kim, Ray Tracing Gems 2019):
 
     Sigma = k^2 / 2 * sum over neighbours (x' - x)(x' - x)^T  +  (blur^2 + least^2) I
     E(x)  = Phi * 2 max(0, 1 - q) / (pi sqrt(det Sigma)),   q = x^T Sigma^-1 x

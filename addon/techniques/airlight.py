@@ -138,7 +138,7 @@ class Airlight(Technique):
     fills = ("volume",)
     params = (
         Param(
-            "rays", "Rays", 4,
+            "rays", "Points per ray", 4,
             "Points on each pixel's ray at which in-scattered light is evaluated in a sample, shared by all lights",
             1, 64, draft=2,
         ),

@@ -1,4 +1,4 @@
-"""Ambient Occlusion: the pass of that name, how open what a pixel sees is to what lies around it.
+"""Ambient Occlusion: the render pass of that name, which is the unoccluded share of the hemisphere at each surface.
 
     AO = mean over directions, by the cosine, of whether a ray meets nothing within the world's Distance
 
@@ -28,7 +28,8 @@ from ..snapshot.scene import Note
 from ..surfaces.draw import SURFACE_TEXTURES
 
 OPEN = "film.open"
-APART = 1 << 16  # numbers of directions of a sample's points: each is stratified over samples, slices and time steps
+# Between the sequence numbers of a sample's film points: each point stratifies its directions over all samples.
+APART = 1 << 16
 CAST = passes.fullscreen_program(
     "ambient occlusion",
     "occlusion/open.frag.glsl",
@@ -50,7 +51,7 @@ class AmbientOcclusion(Technique):
         return None if snapshot.film.open_within is not None else "the view layer asks for no Ambient Occlusion"
 
     def begin(self, frame: Frame) -> None:
-        self._points = (-1, 0)  # of which sample how many points are drawn
+        self._points = (-1, 0)  # number of a sample, how many of its film points are drawn
         frame.held.add(Write(OPEN, "RGBA32F", "How open what is seen is to what lies around", True))
         if frame.hierarchy("shadow") is None:
             text = "it is 1 everywhere: the scene has more triangles than rays can be cast among."

@@ -79,7 +79,7 @@ class CausticsMapping(Technique):
             1.0, 16.0,
         ),
         Param(
-            "by", "Photons by", LOOKUPS, "How the end of a photon's path is found",
+            "by", "Photons by", LOOKUPS, "How the place where a photon lands is found",
             items=(
                 (LOOKUPS, "Look-Ups", 0, "Steps in images of what the light sees: fast, and blind behind it"),
                 (RAYS, "Rays", 1, "Rays through all triangles"),

@@ -126,7 +126,7 @@ class DepthComplexity(EdgeShadows):
     params = (
         Param(
             "points", "Points", "64",
-            "Points on each light for which the layers towards a pixel are counted",
+            "Number of points on each light whose visibility from a pixel is tested in each sample",
             items=COUNTS,
         ),
         Param(

@@ -20,7 +20,7 @@ than about five times the way to its neighbours in the picture,
     L_shared = f cos |cos_y| Le / max(r^2, r_0^2),   r_0^2 = SPREAD median(d_k^2 p_k) / p,   d_k from point to point
 
 and what this leaves out close by each pixel adds by points of its own: it draws eight for a ray and keeps one by what
-it brings (light/mesh_rays.glsl). Where a tenth of what is lit is as near as the meshes are large, all light comes so.
+it brings (light/mesh_rays.glsl). Where half of what is lit is as near as the meshes are large, all light comes so.
 
 Emission that varies is measured place by place (scene/emission_maps.py).
 

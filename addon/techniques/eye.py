@@ -209,10 +209,14 @@ class EyeModel(Technique):
             "spectrum", "Spectrum", spectrum.EQUAL,
             "Spectrum of the lamps that dazzle: how far their needles disperse into colours", items=SPECTRA,
         ),
-        Param("kelvin", "Temperature", 2800.0, "Of a blackbody, in kelvin", 800.0, 20000.0),
+        Param(
+            "kelvin", "Temperature", 2800.0,
+            "Colour temperature of the spectrum Blackbody, in kelvin",
+            800.0, 20000.0,
+        ),
         Param(
             "planes", "Planes", ONE,
-            "Where in the eye scatterers stand", items=PLANES,
+            "Number of planes in the eye on which the particles that scatter light are placed", items=PLANES,
         ),
         Param("person", "Person", 0, "Seed of the observer's eye", 0, 2**20),
     )  # fmt: skip

@@ -126,7 +126,7 @@ class Grass(Technique):
         ),
         Param(
             "placement", "Placement", AXES,
-            "What tiles and maps lie along",
+            "Coordinates along which grass tiles and maps are laid out",
             scope=MATERIAL,
             items=(
                 (AXES, "Object Axes", 0, "X and Y axes of the object: ground"),

@@ -86,10 +86,14 @@ class History(Technique):
     name = "history"
     label = "History"
     params = (
-        Param("drafts", "While the View Moves", True, "Carry light of the last pictures along in a moving viewport"),
+        Param(
+            "drafts", "While the View Moves", True,
+            "Reuse diffuse light from the previous pictures while the viewport changes, for less noise",
+        ),
         Param(
             "animation", "In Animations", False,
-            "Carry light along where one process renders several frames; each then depends on those before it",
+            "Reuse diffuse light from the previous frames of an animation of one sample, for less flicker; each frame "
+            "then depends on those that the same process rendered before",
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -190,12 +190,14 @@ class ShadedReflections(Technique, BothWays):
     params = (
         Param(
             "bounces", "Mirror bounces", 8,
-            "Number of consecutive mirror reflections that are shaded; 0: reflections show mean colours",
+            "Number of consecutive mirror reflections that are shaded; 0: reflections show each material in one "
+            "average colour, without textures",
             0, 64, draft=0,
         ),
         Param(
             "roughness", "Roughness", 0.6,
-            "Reflections up to this roughness show surfaces with their own materials; rougher ones show mean colours",
+            "Reflections up to this roughness show surfaces with their own materials; rougher ones show each material "
+            "in one average colour, without textures",
             0.0, 1.0,
         ),
     )  # fmt: skip

@@ -62,7 +62,7 @@ class TemporalGlare(Technique):
     params = (
         MODE,
         Param("strength", "Strength", 1.0, "Strength of the glare; 1: physically correct", 0.0, 10.0),
-        Param("white", "White", 1.0, "Radiance that the display shows as white; brighter pixels cause glare", 0.0, 1e4),
+        Param("white", "White", 1.0, "Pixel value that is displayed as white; brighter pixels cause glare", 0.0, 1e4),
         Param(
             "luminance", "Scene Luminance", 100.0,
             "Luminance of the pixel value 1, in cd/m²; the pupil adapts to it",

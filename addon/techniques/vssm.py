@@ -98,8 +98,8 @@ class VarianceSoftShadows(SoftMaps):
         Param("cells", "Cells", 3, "Cells along each side of the blocker search kernel", 2, 8),
         Param(
             "rule", "Rule", "BOUNDS",
-            "How to decide whether the depth moments of a cell are reliable: by its depth bounds, or by its mean as "
-            "in the source",
+            "How to decide whether the depth moments of a cell are reliable: by its depth bounds, or by its mean "
+            "depth alone",
             items=RULES,
         ),
         REFINE,

@@ -73,6 +73,7 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "navigation")
+        column.prop(context.scene.render, "preview_pixel_size")
         column.prop(settings, "seed")
 
 
@@ -110,7 +111,8 @@ class CANDELA_RENDER_PT_simplify(_CandelaPanel, bpy.types.Panel):
 class CANDELA_RENDER_PT_performance(_CandelaPanel, bpy.types.Panel):
     """What Blender itself keeps between frames: Candela keeps its own data in any case"""
 
-    bl_label = "Performance"
+    bl_label = "Final Render"  # as in Cycles' panel Performance
+    bl_parent_id = "CANDELA_RENDER_PT_techniques"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):

@@ -167,8 +167,8 @@ def _annotations() -> dict:
         ),
         "navigation": bpy.props.EnumProperty(
             name="Navigation", default="10", update=_redraw,
-            description="Pictures a second while the view or the scene changes: pixels are drawn as coarse as that "
-            "takes, but never fewer than 64 from top to bottom of the camera's frame",
+            description="Frame rate to aim for while the view or the scene changes. The resolution is lowered as far "
+            "as that takes, but never below 64 pixels along the height of the camera's frame",
             items=(
                 ("10", "10 fps", "Finer pixels"), ("20", "20 fps", "Smoother"), ("30", "30 fps", "Smoothest"),
             ),
@@ -189,12 +189,13 @@ def _annotations() -> dict:
     }  # fmt: skip
     out["pass_tree"] = bpy.props.PointerProperty(
         type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE, update=_redraw,
-        description="Render the passes of this tree; without one, Candela chooses them by slot and scene",
+        description="Render the passes of this node tree; without one, Candela chooses techniques by the menus of the "
+        "panels above and by the scene",
     )  # fmt: skip
     for slot in slots():
         out[f"slot_{slot}"] = bpy.props.EnumProperty(
             name=slot.capitalize(),
-            description=f"Technique for the {slot} slot",
+            description=f"Technique for this part of the light ({slot}); Auto chooses by what the scene holds",
             items=_slot_items(slot),
             default=AUTO,
             update=_redraw,

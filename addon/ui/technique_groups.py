@@ -27,14 +27,14 @@ GROUPS = (
         "light", "Light and Shadows", (("shadow", "Shadows"), ("environment", "World Light")),
         ("direct_light", "emissive_light", "light_probes"),
     ),
-    Group("bounced_light", "Bounced Light", (("indirect", "Bounces"),)),
+    Group("bounced_light", "Bounced Light", (("indirect", "Technique"),)),
     Group(
         "reflections", "Reflections and Glass", (("reflection", "Reflections"), ("transmission", "Glass")),
         ("shaded_reflections", "edit_heat"),
     ),
     Group("caustics", "Caustics", (("caustics", "Caustics"),)),
     Group("fog", "Fog and Smoke", (("volume", "Fog"),), ("volume_caustics", "media")),
-    Group("skin", "Skin and Wax", (("subsurface", "Below Surfaces"),)),
+    Group("skin", "Skin and Wax", (("subsurface", "Subsurface"),)),
 )  # fmt: skip
 OTHERS = Group("others", "Others", ())
 

@@ -1,4 +1,4 @@
-// Triangles as casters are drawn into a depth map (addon/frame/probe.py).
+// Triangles as casters are drawn into a depth map (addon/frame/device_probe.py).
 #include "lib/projection.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// A shadow ray of each pixel between towers to a lamp, for the time that it takes (addon/frame/probe.py).
+// A shadow ray of each pixel between towers to a lamp, for the time that it takes (addon/frame/device_probe.py).
 #include "trace/hierarchy.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// Texels far apart, read in an order that no neighbour shares (addon/frame/probe.py).
+// Texels far apart, read in an order that no neighbour shares (addon/frame/device_probe.py).
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);

@@ -210,7 +210,7 @@ READ = {
     "render": (
         *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),
         *("use_simplify", "use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
-        *("motion_blur_shutter_curve", "use_persistent_data"),
+        *("motion_blur_shutter_curve", "use_persistent_data", "preview_pixel_size"),
     ),
     "output": ("resolution_x", "use_border", "pixel_aspect_x"),
     "view_layer": (
