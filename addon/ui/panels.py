@@ -20,7 +20,7 @@ from .texts import wrapped
 
 TAB_S, TAB_TRIES = 0.05, 40  # between tries to show a tab that the editor may not have yet, and how many
 MOST_NOTES = 12  # more than these are counted only
-_PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else in their group
+_PARENTS = dict.fromkeys(("denoise", "history"), "CANDELA_RENDER_PT_sampling")  # where artists look; else by group
 # Bounces by kind of light, as far as techniques limit them themselves.
 _BOUNCES = (
     ("shaded_reflections", "bounces", "Glossy"),
@@ -194,7 +194,7 @@ def _technique_panel(technique) -> type:
         "__module__": __name__,
         "bl_label": titled(technique.label),
         "bl_parent_id": _PARENTS.get(technique.name, f"CANDELA_RENDER_PT_group_{group_of(technique).name}_advanced"),
-        "bl_options": set() if technique.name in _PARENTS else {"DEFAULT_CLOSED"},
+        "bl_options": set() if technique.name == "denoise" else {"DEFAULT_CLOSED"},
         "poll": poll,
         "draw": draw,
     }
