@@ -9,8 +9,7 @@ import pytest
 
 from addon.gfx.interface import Interface, answered, asked_by
 from addon.gfx.library import FULLSCREEN_VERTEX, MOST_TEXTURES, SHADER_ROOT, get, resolve
-from addon.lighting.grass import GRASS
-from addon.lighting.leaving_light import LEAVES
+from addon.lighting.asked import SHAPES
 from addon.lighting.linked import LINKS
 from addon.lighting.loop import RAYS_WHERE_NEAR, lighting
 from addon.lighting.media import MEDIA
@@ -19,7 +18,7 @@ from addon.scene.panorama import ANSWERS
 from addon.sources.lights import SOURCES
 from tests.gfx.declared import _found, programs
 
-INTERFACES = (GRASS, MEDIA, LINKS, LEAVES)
+INTERFACES = (*SHAPES, LINKS)
 LEAVES_OUT = re.compile(r"^// Leaves out (\w+): \w.+\.$", re.MULTILINE)
 FUNCTION = re.compile(r"^(?:void|bool|int|float|vec[234]|Grass\w+) (\w+)\(", re.MULTILINE)
 
