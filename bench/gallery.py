@@ -76,6 +76,12 @@ def _scattering(name: str) -> Callable[[], None]:
     return made
 
 
+def _veins() -> None:
+    from bench import subsurface_costs as painted
+
+    painted.with_maps("veins")
+
+
 def _stones() -> None:
     from bench import strips
 
@@ -129,6 +135,8 @@ GALLERY = {
     "fog": Shown("Fog and haze", "shafts of the sun through a window", "media.md", _medium("window in haze")),
     "subsurface": Shown("Light below surfaces", "random walks where a body is thin, maps to paint how deep light goes",
                         "subsurface.md", _scattering("ears")),
+    "painted": Shown("Translucency painted on a surface", "veins below the skin, as maps of tint",
+                     "subsurface.md", _veins),
     "grass": Shown("Grass from one rendered patch", "any number of blades at the cost of their pixels",
                    "grass.md", _grass),
     "relief": Shown("Displacement without subdivision", "a plane of two triangles, with its own outlines and shadows",

@@ -168,9 +168,10 @@ def _wick(u, v):
     return np.where(np.hypot(u - 0.25, v - 0.25) < 0.05, 0.0, 1.0)
 
 
-def painted(folder: Path | None) -> str:
+def _painted_cases() -> dict:
+    """By label: values of the material, what places its body, and the maps that are painted, by name."""
     skin = (*subsurface.SKIN, 0.25)
-    cases = {
+    return {
         "cheeks, soft": (skin, head, {"tint_map": _cheeks}),
         "cheeks, sharp (blur an eighth there)": (
             skin, head, {"tint_map": _cheeks, "blur_map": lambda u, v: np.where(_cheeks(u, v)[..., 1] < 1, 0.0, 0.5)},
@@ -178,9 +179,21 @@ def painted(folder: Path | None) -> str:
         "veins": (skin, head, {"tint_map": _veins}),
         "candle, opaque wick": ((*subsurface.WAX, 0.8), wick_candle, {"translucency_map": _wick}),
     }  # fmt: skip
+
+
+def with_maps(label: str) -> None:
+    """Leave the scene of one of these cases open, with its maps."""
+    values, place, maps = _painted_cases()[label]
+    subsurface.clear()
+    shown = subsurface.material("BURLEY", *values)
+    place(shown)
+    _set(shown, **{k: _image(k, paint) for k, paint in maps.items()})
+
+
+def painted(folder: Path | None) -> str:
     neutral = {"blur_map": 0.5, "tint_map": 1.0, "translucency_map": 1.0}
     rows = [["scene", "seconds without maps", "with neutral maps", "with its maps", "ratio", "neutral maps change"]]
-    for label, (values, place, maps) in cases.items():
+    for label, (values, place, maps) in _painted_cases().items():
         subsurface.clear()
         shown = subsurface.material("BURLEY", *values)
         place(shown)
