@@ -307,15 +307,27 @@ def _free_old() -> None:
     _free_dropped()
 
 
-def _free_dropped() -> None:
+def _free_dropped(of_renders: bool = True) -> None:
+    """Free what waits for this context; `of_renders`: also what only final renders have drawn."""
     if not _dropped:
         return
     gpu.shader.unbind()  # the last one that drew may be among them
     lasts = images.lasts()
     for _ in range(len(_dropped)):  # others may come to the end meanwhile
         one = _dropped.pop(0)
-        if one.lasts and not lasts:
+        if (one.lasts and not lasts) or not (one.lasts or of_renders):
             _dropped.append(one)
+
+
+def free_lasting(most: int) -> None:
+    """Between pictures, in a context that lasts: where more than `most` programs that such a one has drawn are held or
+    wait to be freed, free them all. What final renders have drawn is left to them."""
+    held = [program for program, shader in _shaders.items() if shader.kept.lasts]
+    waiting = sum(one.lasts for one in _dropped)
+    if len(held) + waiting > most and images.lasts() and context.available():
+        for program in held:
+            del _shaders[program]
+        _free_dropped(of_renders=False)
 
 
 @on_release
