@@ -196,13 +196,18 @@ def test_an_instance_is_linked_as_its_parent_is_before_itself():
     assert table.of(9, 0).unlit == table.of(1, 9).unlit == (2,)
 
 
-def test_a_lamp_that_leaves_out_wax_lights_no_side_of_it(stage):
-    """Points of the mesh that the camera does not see have links, too; a lamp behind lights the other object alone."""
+def waxen(stage):
     wax = stage.principled(
         Base_Color=(0.8, 0.8, 0.8, 1), Subsurface_Weight=1.0, Subsurface_Scale=4.0, Subsurface_Radius=(1, 1, 1),
         Specular_IOR_Level=0.0,
     )  # fmt: skip
     wax.node_tree.nodes[0].subsurface_method = "BURLEY"
+    return wax
+
+
+def test_a_lamp_that_leaves_out_wax_lights_no_side_of_it(stage):
+    """Points of the mesh that the camera does not see have links, too; a lamp behind lights the other object alone."""
+    wax = waxen(stage)
     body, other = box(stage, 0.0), box(stage, 5.0)
     body.data.materials[0] = wax
     stage.light("POINT", (1.0, -2.0, 1.5))
@@ -219,11 +224,7 @@ def test_a_lamp_that_leaves_out_wax_lights_no_side_of_it(stage):
 
 def test_what_a_lamp_does_not_take_as_a_blocker_leaves_its_light_to_the_far_sides_of_wax(stage):
     """Points of the mesh that the camera does not see are lit past a board whose shadow the lamp does not throw."""
-    wax = stage.principled(
-        Base_Color=(0.8, 0.8, 0.8, 1), Subsurface_Weight=1.0, Subsurface_Scale=4.0, Subsurface_Radius=(1, 1, 1),
-        Specular_IOR_Level=0.0,
-    )  # fmt: skip
-    wax.node_tree.nodes[0].subsurface_method = "BURLEY"
+    wax = waxen(stage)
     body = box(stage, 0.0)
     body.data.materials[0] = wax
     behind = stage.light("POINT", (0, 3, 0.5), energy=500)
