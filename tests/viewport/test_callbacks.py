@@ -49,6 +49,7 @@ class Window:
         self.region_data.window_matrix = scene.camera.calc_matrix_camera(graph, x=SIZE[0], y=SIZE[1])
         self.screen = type("Screen", (), {"areas": ()})()
         self.target = images.Target((images.create(*SIZE, "RGBA32F"),))
+        self.target.clear()  # pictures are blended over what Blender has drawn there
 
     def update(self, made):
         viewport.changed(made, self, bpy.context.evaluated_depsgraph_get())
