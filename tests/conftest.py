@@ -93,6 +93,27 @@ def few_programs():
         library.free_lasting(library.MOST_PROGRAMS)
 
 
+@pytest.fixture(autouse=True)
+def undefined_content(monkeypatch):
+    """With CANDELA_UNDEFINED=1 what images hold before they are drawn is not a number, as it may be on any GPU: a test
+    that then fails looks at what nobody has drawn."""
+    if not os.environ.get("CANDELA_UNDEFINED"):
+        return
+    from addon.gfx import images
+
+    def spoilt(made):
+        def make(*arguments):
+            image = made(*arguments)
+            if "F" in image.format and "DEPTH" not in image.format:
+                image.texture.clear(format="FLOAT", value=(float("nan"),) * 4)
+            return image
+
+        return make
+
+    monkeypatch.setattr(images.Pool, "take", spoilt(images.Pool.take))
+    monkeypatch.setattr(images, "create", spoilt(images.create))
+
+
 @pytest.fixture(scope="module", autouse=True)
 def memory_of_the_file(request):
     """With CANDELA_MEMORY=FILE: a line for each file of tests, of what this process holds after it."""
