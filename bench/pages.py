@@ -95,6 +95,9 @@ def command(options: argparse.Namespace) -> int:
     commit = ages.git("rev-parse", "HEAD") or ""
     done = done_at(commit)
     chosen = [one for one in commands() if options.only is None or options.only in one]
+    if not chosen:
+        print(f"No page is written by a command that holds '{options.only}': --list names them all.")
+        return 2
     if options.list:
         for one in chosen:
             print(f"{f'{done[one]:.0f} s' if one in done else '-':>8}  {one}")

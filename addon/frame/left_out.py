@@ -52,13 +52,13 @@ def _for_size(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:
     bent = bends_lines(snapshot)
     if missing := _missing(plan, bent):
         yield Note("Camera", f"{bent}: {missing} missing from the picture.")
-    traces = acceleration.too_many(snapshot) is None
-    for reason in (acceleration.too_many(snapshot), acceleration.too_many_copies(snapshot)):
+    too_many = acceleration.too_many(snapshot)
+    for reason in (too_many, acceleration.too_many_copies(snapshot)):
         if missing := _missing(plan, reason):
             text = f"{reason}: {missing} missing from the picture. "
             yield Note("Scene", text + "Give meshes fewer faces, or use copies of one mesh in place of many.")
         names = {row.name for row in plan.skipped if row.reason == reason}
-        if not traces and "instant_radiosity" in names and "indirect" in plan.filled:
+        if too_many is not None and "instant_radiosity" in names and "indirect" in plan.filled:
             yield Note("Scene", f"{reason}: bounced light is missing where it comes from what the camera does not see.")
 
 

@@ -136,8 +136,8 @@ class EmissiveLight(Technique):
         flags = lights.SHADOW_FLAG + lights.TRACED_FLAG + lights.GLASS_BLOCKS_FLAG * blocked
         provider = frame.service(VisibilityProvider)
         patches = provider is not None and provider.serves_every_source(frame)
-        own = self._triangles.row((0.5, 0.5, 0.5), count, flags, 1, 8.0 * frame.settings.samples)
         if self._own is not None:
+            own = self._triangles.row((0.5, 0.5, 0.5), count, flags, 1, 8.0 * frame.settings.samples)
             points = [LightPoint(own, self._rays)] * count
             yield from light_surfaces(
                 frame, self, points, 1 << lights.SURFACE, self._sources, lambda *_: self._own_rays(frame)
@@ -166,10 +166,10 @@ class EmissiveLight(Technique):
             views = [replace(view, glass_blocks=True) for view in views] if blocked else views
             row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)
             points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
-        for point in points if self._own is not None else ():
-            point.row[lights.LIGHT.at.least] = (
-                self._left_out * point.row[lights.LIGHT.at.area] * count / self._triangles.power
-            )
+        if self._own is not None:
+            spread = self._left_out * count / self._triangles.power
+            for point in points:
+                point.row[lights.LIGHT.at.least] = spread * point.row[lights.LIGHT.at.area]
         yield from light_surfaces(frame, self, points, 1 << lights.SURFACE, self._sources)
 
     def _choose_own(self, frame: Frame) -> None:

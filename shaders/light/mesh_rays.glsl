@@ -71,7 +71,7 @@ Light own_point(Light light, int number)
     cos_light = (edge.w > 0.5) ? max(cos_light, 0.0) : abs(cos_light);
     // What is drawn more often counts the less: in proportion to luminance and, as often, to area.
     float shining = luminance(abs(radiance));
-    float often = shining + mesh_light_level;
+    float often = emissive_density(radiance, mesh_light_level);
     float left_out = 1.0;
     if (mesh_light_least > 0.0) {
       left_out = 1.0 - min(squared * often / mesh_light_least, 1.0);

@@ -6,6 +6,7 @@
 #include "lib/instance.glsl"
 #include "generated/material"
 #include "surface/fragment.glsl"
+#include "surface/layer.glsl"
 
 void main()
 {
@@ -17,17 +18,9 @@ void main()
   if (surface_position_fetch(ivec2(gl_FragCoord.xy)).w < 0.0 || fragment_hidden(point.position, -1.0)) {
     discard;
   }
-  point.refracts = glass_bends != 0;
-  Closures c = closures_begin(point.normal, 0.5, 0.0);
-  evaluate_material(point, c);
-  closures_end(c);
-#ifdef ADDED_LOBES
-  float mean = layer_chance(c);
-#else
-  float mean = dot(c.transparency, vec3(1.0 / 3.0));
-#endif
-  vec3 color = c.transparency / max(mean, 1e-20);
-  bool colored = mean > 0.0 && min(color.x, min(color.y, color.z)) >= 0.0;
+  Closures c;
+  vec3 color;
+  bool colored = layer_color(point, c, color);
   out_position = vec4(point.position, 1.0);
   out_tint = vec4(colored ? color : vec3(1.0), 1.0);
   out_emission = vec4((instance.flags & FLAG_HOLDOUT) != 0 ? vec3(0.0) : c.emission, 0.0);

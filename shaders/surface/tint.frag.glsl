@@ -6,6 +6,7 @@
 #include "lib/instance.glsl"
 #include "generated/material"
 #include "surface/fragment.glsl"
+#include "surface/layer.glsl"
 
 void main()
 {
@@ -17,17 +18,9 @@ void main()
   if (fragment_hidden(point.position, -1.0)) {
     discard;
   }
-  point.refracts = glass_bends != 0;
-  Closures c = closures_begin(point.normal, 0.5, 0.0);
-  evaluate_material(point, c);
-  closures_end(c);
-#ifdef ADDED_LOBES
-  float mean = layer_chance(c);
-#else
-  float mean = dot(c.transparency, vec3(1.0 / 3.0));
-#endif
-  vec3 color = c.transparency / max(mean, 1e-20);
-  if (mean <= 0.0 || min(color.x, min(color.y, color.z)) < 0.0) {
+  Closures c;
+  vec3 color;
+  if (!layer_color(point, c, color)) {
     discard;
   }
   out_diffuse = vec4(color, 1.0);

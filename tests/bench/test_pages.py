@@ -32,3 +32,8 @@ def test_another_commit_begins_again(monkeypatch, tmp_path):
     monkeypatch.setattr(pages, "STATE", tmp_path / "pages.json")
     pages.keep("old", {"one": 1.0})
     assert pages.done_at("old") == {"one": 1.0} and pages.done_at("new") == {}
+
+
+def test_a_command_that_no_page_has_is_told(capsys):
+    assert pages.command(argparse.Namespace(list=False, only="no such page", again=False)) == 2
+    assert "no such page" in capsys.readouterr().out
