@@ -42,7 +42,6 @@ STEREO = ("left", "right")
 NO_CONTEXT_YET = (
     "Blender before 5.2 opens the GPU by a render, which would end a bake: render any picture first, then bake again."
 )
-CATCHERS_WHOLE = "A picture with shadow catchers cannot be rendered in slices: render it whole."
 
 
 @dataclass
@@ -279,8 +278,6 @@ class CandelaEngine(bpy.types.RenderEngine):
         if taken is not None:
             keep = partial(taken.__setitem__, layer.name)
         catches, moments = snapshot.has_catchers and not self.is_preview, self._moments
-        if catches and (taken is not None or given or settings.is_slice):
-            raise ValueError(CATCHERS_WHOLE)
         if moments is not None and eye:  # seen through the eye's camera at the frame itself
             seen = (replace(one, camera=snapshot.camera) for one in moments.snapshots)
             moments = replace(moments, snapshots=tuple(seen))

@@ -87,13 +87,13 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.n
     """
     with turn:
         order.before()
-    plates = None
+    plates = held = None
     if order.catches:
-        order, plates = yield from _plates(order)
+        order, plates, held = yield from _plates(order)
     if order.take is None and order.given is None:  # slices hold all there is
         asked = images_of(order.wanted, catcher.IMAGES if plates else ())
         order = replace(order, settings=replace(order.settings, shows=frozenset(asked)))
-    parts, total, held = parts_of(order.snapshot), light_groups.Sum(order.snapshot.film), None
+    parts, total = parts_of(order.snapshot), light_groups.Sum(order.snapshot.film)
     for number, part in enumerate(parts):
         own = str(number) if len(parts) > 1 else ""  # under which a slice holds the part's images
         frame = yield from _part(order, part.snapshot, Share(number, len(parts), own, total))
@@ -108,21 +108,27 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.n
     return pixels_of(total, frame, order.wanted, plates), frame.ledger
 
 
-def _plates(order: Order) -> Generator[Progress | None, None, tuple[Order, tuple]]:
-    """Draw the pictures with all and with shadow catchers alone; returns what is left to be drawn, and what that is
-    composed with: both as catcher.Layer, and whether the film is transparent. The first tells how many samples all
-    have, and has a third of a time limit."""
-    shows, limit = frozenset(catcher.IMAGES), order.settings.time_limit / PICTURES_OF_CATCHERS
-    found, settings = [], replace(order.settings, time_limit=limit, shows=shows)
-    for changed in (catcher.over_nothing, catcher.catchers_alone):
+def _plates(order: Order) -> Generator[Progress | None, None, tuple[Order, tuple, slices.Slice | None]]:
+    """Draw the pictures with all and with shadow catchers alone; returns what is left to be drawn, what that is
+    composed with (both as catcher.Layer, and whether the film is transparent), and both in a slice, where one is taken.
+    The first tells how many samples all have, and has a third of a time limit."""
+    sliced = order.take is not None or order.given is not None
+    shows = None if sliced else frozenset(catcher.IMAGES)  # slices hold all there is
+    limit = order.settings.time_limit / PICTURES_OF_CATCHERS
+    found, held, settings = [], None, replace(order.settings, time_limit=limit, shows=shows)
+    for name, changed in ((catcher.ALL, catcher.over_nothing), (catcher.PLATE, catcher.catchers_alone)):
         plate = order.of_scene(lambda one, changed=changed: _ungrouped(changed(one)), settings)
         plate.shows, plate.notes, plate.started = False, (), time.perf_counter()
-        frame = yield from _part(plate, plate.snapshot, Share())
+        frame = yield from _part(plate, plate.snapshot, Share(name=name))
         with turn:
+            if order.take is not None:
+                held = slices.taken(frame, name, held)
             found.append(catcher.layer(mean_images(order.renderer, frame, [], catcher.IMAGES), plate.snapshot))
-        settings = replace(settings, samples=frame.samples_done, time_limit=0.0, noise_threshold=0.0)
+        settings = replace(settings, time_limit=0.0, noise_threshold=0.0)
+        if not (sliced or settings.is_slice):
+            settings = replace(settings, samples=frame.samples_done)
     transparent = order.snapshot.film.transparent
-    return order.of_scene(catcher.catchers_unseen, settings), (*found, transparent)
+    return order.of_scene(catcher.catchers_unseen, settings), (*found, transparent), held
 
 
 def _ungrouped(snapshot: Snapshot) -> Snapshot:

@@ -230,6 +230,7 @@ def page(rows: list[Row], options: argparse.Namespace) -> str:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--folder", type=Path, default=ROOT / "out" / "others", help="of the repositories (out/others)")
+    parser.add_argument("--repository", default="", metavar="TEXT", help="those whose owner/name has this in it")
     parser.add_argument("--only", default="", metavar="TEXT", help="files whose path has this in it")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="each Nth file")
     parser.add_argument("--samples", type=int, default=16, metavar="N", help="default 16")
@@ -249,7 +250,7 @@ def command(options: argparse.Namespace) -> int:
         print("--every takes a number of at least 1.", file=sys.stderr)
         return 2
     rows = []
-    for repository in repositories():
+    for repository in (one for one in repositories() if options.repository in one["name"]):
         try:
             place = fetch(repository, options.folder.resolve())
         except (OSError, subprocess.CalledProcessError) as error:

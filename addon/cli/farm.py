@@ -51,7 +51,6 @@ def write_job(job: Job) -> None:
         )
     if options.split_samples > 1:  # what every task would refuse
         slices.check_layers(scene)
-        slices.check_catchers(scene, job.layer)
     if options.split_samples > scene.candela.samples:
         raise Refused(f"{scene.candela.samples} samples cannot be split into {options.split_samples} slices.", USAGE)
     name = options.file.stem

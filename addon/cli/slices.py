@@ -16,9 +16,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .. import engine
 from ..compare.exr_write import read_about, write_exr
 from ..compare.reference import scene_hash
+from ..film import catcher
 from ..frame import slices
 from ..snapshot.exr import ExrError, read_exr
 from ..snapshot.own_settings import all_settings
@@ -27,7 +27,6 @@ from .refused import USAGE, Refused
 
 ABOUT = "candela"
 SUM = "sum "
-SURFACES = ("MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD")  # what can catch shadows
 # What slices of one picture have in common.
 ALIKE = ("scene_hash", "settings_hash", "frame", "total", "options", "blender", "layers")
 UNLIKE = {  # how a person knows them
@@ -101,43 +100,6 @@ def check_layers(scene: bpy.types.Scene) -> None:
         )
 
 
-def check_catchers(scene: bpy.types.Scene, layer: bpy.types.ViewLayer | None) -> None:
-    """Raise Refused where a view layer that is rendered, or the one given, shows a shadow catcher as the scene stands.
-
-    What geometry nodes instance is not known without evaluating the scene as a render does, which refuses it then.
-    """
-    for one in [layer] if layer is not None else [each for each in scene.view_layers if each.use]:
-        shown, branches = [], [one.layer_collection]
-        while branches:
-            branch = branches.pop()
-            if not branch.collection.hide_render:
-                branches += branch.children
-                shown += [] if branch.exclude else [branch.collection]
-        if _holds_catchers(shown):
-            raise Refused(engine.CATCHERS_WHOLE)
-
-
-def _holds_catchers(shown: list[bpy.types.Collection]) -> bool:
-    """Whether an object of these collections, or of those that their objects instance, is rendered as a catcher."""
-    # With each: whether the object of the view layer that instances it is a catcher; None: it stands there itself.
-    waiting: list[tuple[bpy.types.Collection, bool | None]] = [(one, None) for one in shown]
-    seen = set(waiting)
-    while waiting:
-        collection, caught = waiting.pop()
-        for owner in collection.objects:
-            if owner.hide_render:
-                continue
-            if owner.type in SURFACES and (owner.is_shadow_catcher or caught):
-                return True
-            if owner.instance_type == "COLLECTION" and owner.instance_collection is not None:
-                within = owner.is_shadow_catcher if caught is None else caught
-                inner = [owner.instance_collection, *owner.instance_collection.children_recursive]
-                found = {(one, within) for one in inner if not one.hide_render} - seen
-                seen |= found
-                waiting += found
-    return False
-
-
 def settings_hash(scene: bpy.types.Scene) -> str:
     """Hexadecimal hash of Candela's settings that a final picture of the scene depends on: its own and those of all
     data-blocks. Which samples are drawn is left out, and what does not count for slices."""
@@ -187,6 +149,8 @@ def _shown(found: slices.Slice) -> np.ndarray:
     """The mean of a slice's light, for viewers."""
     light, covered = [], 1.0
     for name, pixels in found.images.items():
+        if slices.part_of(name) in catcher.PARTS:
+            continue
         name = name.removeprefix(f"{slices.part_of(name)}:")
         if name.startswith(("film.", "radiance.")) and name not in slices.FIRST:
             light.append(pixels)

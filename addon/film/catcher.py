@@ -20,7 +20,8 @@ which cannot say where a catcher is brighter than before; else the world stands 
 | time | three pictures; other passes are those of `things` |
 | memory | two pictures on the CPU |
 
-Scenes without catchers make one picture, as ever. Not drawn: catchers in the viewport, and slices of such pictures.
+Scenes without catchers make one picture, as ever. Slices hold sums of all three (frame/slices.py). Not drawn: catchers
+in the viewport.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from ..snapshot.scene import Snapshot
 
 COMBINED, WORLD = "film.combined", "radiance.environment"
 IMAGES = (COMBINED, WORLD)  # what is read of each of the three
+ALL, PLATE = PARTS = ("all", "plate")  # under which slices hold the first two
 SURE = 0.5  # share of a pixel from which on its own light is enough to know what has changed
 LEAST = 0.01  # share of a pixel below which nothing is known of what covers it
 

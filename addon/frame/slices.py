@@ -49,7 +49,7 @@ def taken(frame: Frame, part: str = "", before: Slice | None = None) -> Slice:
     wanted = {frame.held.shown.get(name, name) for name in frame.held.sums} | set(FIRST) | frame.read_last
     wanted |= {name for name in frame.images if name.endswith(HALF) or name.startswith(RANKED)}
     read = {joined(part, name): images.read(frame.images[name]) for name in sorted(wanted) if name in frame.images}
-    if part and before is not None:
+    if before is not None:
         read = before.images | read
     settings = frame.settings
     return Slice(settings.sample_offset, frame.samples_done, settings.samples, read)
@@ -93,8 +93,8 @@ def merged(slices: Sequence[Slice]) -> dict[str, np.ndarray]:
     return found
 
 
-# A picture of several light groups is drawn in parts, one for each (snapshot/light_groups.py); a slice holds the images
-# of all of them, those of a part under its number.
+# A picture of several light groups is drawn in parts, one for each (snapshot/light_groups.py), and one with shadow
+# catchers needs two more (film/catcher.py); a slice holds the images of all, those of a part under its number or name.
 def joined(part: str, name: str) -> str:
     return f"{part}:{name}" if part else name
 

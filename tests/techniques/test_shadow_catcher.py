@@ -5,7 +5,7 @@ import pytest
 
 from addon import engine
 from addon.compare.metrics import relative_squared_error
-from addon.frame import ledger
+from addon.frame import ledger, slices
 
 SIZE = (64, 48)
 
@@ -92,13 +92,23 @@ def test_all_pictures_have_as_many_samples_where_they_end_early(caught):
         assert np.abs(found[name] - whole[name]).mean() < 0.02
 
 
-def test_slices_are_refused(caught):
-    engine.taken = {}
+@pytest.mark.parametrize("transparent", [True, False])
+def test_slices_make_the_picture_of_all_samples(caught, monkeypatch, transparent):
+    caught.scene.render.film_transparent = transparent
+    whole, taken = with_pass(caught, "CANDELA", 4), []
+    own = caught.scene.candela
     try:
-        with pytest.raises(Exception, match="cannot be rendered in slices"):
-            caught.render(4, SIZE)
+        for own.sample_offset, own.sample_count in ((0, 1), (1, 3)):
+            monkeypatch.setattr(engine, "taken", {})
+            with_pass(caught, "CANDELA", 4)
+            taken.append(*engine.taken.values())
     finally:
-        engine.taken = None
+        own.sample_offset = own.sample_count = 0
+    monkeypatch.setattr(engine, "taken", None)
+    monkeypatch.setattr(engine, "given", {caught.scene.view_layers[0].name: slices.merged(taken)})
+    found = with_pass(caught, "CANDELA", 4)
+    for name in ("combined", "shadow_catcher", "diffuse_direct"):
+        np.testing.assert_allclose(found[name], whole[name], atol=1e-4 * np.abs(whole[name]).max(), err_msg=name)
 
 
 def test_the_viewport_says_what_it_draws(caught):
