@@ -2,8 +2,9 @@
 
 A technique `remembers` images that it writes; the renderer takes them out of the last picture before that is dropped
 and hands them to the next one as `frame.before`. It does so only where the light that surfaces receive is the same
-but for what moves: the camera, and objects that keep their form. After any other edit (of a lamp, a material, the
-world, a mesh, the settings; an object that comes or goes) there is no picture before.
+but for what moves: the camera, objects that keep their form, and lamps that keep all but their place. After any other
+edit (of a lamp's power, a material, the world, a mesh, the settings; an object that comes or goes) there is no picture
+before.
 
 So that errors are not the same in all pictures, each of a row of pictures has a seed of its own. The first one has
 the scene's.
@@ -17,7 +18,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from ..gfx import images
-from ..snapshot.scene import Instance, Snapshot
+from ..snapshot.scene import Instance, Light, Snapshot
 from .settings import Settings
 
 MOST_MOVED = 16  # objects that move at once; with more there is no picture before
@@ -35,6 +36,7 @@ class Before:
     key: object  # of all that gives its light but what may move
     turn: int = 1  # how many pictures came before the one after it
     moved: dict[str, np.ndarray] = field(default_factory=dict)  # (4, 4) world now -> world then, by key of the instance
+    lamps: tuple[tuple[Light, Light], ...] = ()  # then and now, of those that have moved
 
     def drop(self) -> None:
         """Give the images back."""
@@ -66,12 +68,18 @@ def usable(before: Before | None, snapshot: Snapshot, key: object) -> Before | N
     if moved is None or len(moved) > MOST_MOVED:
         before.drop()
         return None
-    return replace(before, moved=moved)
+    return replace(before, moved=moved, lamps=lamps_moved(before.snapshot, snapshot))
 
 
 def seeded(settings: Settings, before: Before | None) -> Settings:
     """Settings of the picture after that."""
     return replace(settings, seed=(settings.seed + SEED_STEP * before.turn) % 2**31) if before else settings
+
+
+def lamps_moved(before: Snapshot, now: Snapshot) -> tuple[tuple[Light, Light], ...]:
+    """Lamps of equal keys, then and now, that stand elsewhere. Both snapshots have the same ones in the same order."""
+    pairs = zip(before.lights, now.lights)
+    return tuple((old, new) for old, new in pairs if old is not new and not np.array_equal(old.matrix, new.matrix))
 
 
 _COMPARED: tuple[Callable, ...] = tuple(

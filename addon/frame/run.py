@@ -57,7 +57,7 @@ class Renderer:
         self._lasting: dict[type, object] = {}  # what frames share, by class
         self._frame_key: object = None
         self._untouched = False  # what is begun waits, and the frame before is still whole
-        self._light: object = None  # what gives the frame's light, see frame/history.py
+        self._light: object = None  # what gives the frame's light, but for places of lamps: see frame/history.py
         self._view_block: Block | None = None
         context.on_release(self.release)
 
@@ -140,6 +140,7 @@ class Renderer:
         yield from compiling(self._programs(plan, snapshot, settings))
         ledger.times["compile"] = watch.compiling
         self._frame_key = key
+        light = (lights_key(snapshot, ("matrix",)), *light[1:])
         before = history.usable(history.remembered(self.frame, self._light), snapshot, light)
         self._drop_frame()
         self._light = light
@@ -387,7 +388,7 @@ class Renderer:
         return list(dict.fromkeys(wanted))
 
     def _light_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
-        """Equal for two pictures whose surfaces receive the same light, but for what moves."""
+        """Equal for two pictures whose surfaces receive the same light, but for objects that move; lamps first."""
         # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
         casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
@@ -456,9 +457,10 @@ NO_LIGHT = ("name", "group")  # fields of a lamp that tell nothing of the light 
 IN_TREES = ("random", "pass_index", "color")  # that its node tree alone may ask for
 
 
-def lights_key(snapshot: Snapshot) -> tuple:
-    """Equal in two snapshots if all lamps give the same light."""
-    return tuple(content(one, NO_LIGHT if one.graph is not None else NO_LIGHT + IN_TREES) for one in snapshot.lights)
+def lights_key(snapshot: Snapshot, but: tuple[str, ...] = ()) -> tuple:
+    """Equal in two snapshots if all lamps give the same light, but for fields that are left out."""
+    left_out = NO_LIGHT + but
+    return tuple(content(one, left_out if one.graph is not None else left_out + IN_TREES) for one in snapshot.lights)
 
 
 # What artists call images that programs read beside others (gfx/images.py, gfx/struct.py).

@@ -43,11 +43,13 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..materials.compiler import may_emit
 from ..scene.view import VIEW
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import Light, Snapshot
 from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 MANY, FEW = 32, 8  # samples that history counts for at most; while objects move
+LAMPS = 3.0  # while lamps move: what is shown lags by so many steps
+LAG = 0.3  # of their light, by which what is shown may lag behind lamps that move
 PATHS = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
 REMEMBERED = (
     Write("history.place", "RGBA32F", "Where the surface is from the render origin, m; alpha: samples of direct light"),
@@ -148,6 +150,7 @@ class History(Technique):
         if before:
             frame.count(self, "pictures before", before.turn)
             frame.count(self, "moved objects", len(before.moved))
+            frame.count(self, "moved lamps", len(before.lamps))
 
     def _filtered(self, frame: Frame, shown: images.Target) -> Iterator[None]:
         """Indirect light of neighbours where few pictures stand behind it."""
@@ -170,7 +173,8 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
         return np.zeros((ROWS_OF_VIEW, 4))
     origin = frame.geometry.origin
     lamps = [] if _other_light(frame) else frame.emitters
-    rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved)), (len(lamps), float(not lamps), 0.0, 0.0)]
+    most = _most(frame, before)
+    rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved)), (len(lamps), float(not lamps), most, 0.0)]
     meshes = frame.snapshot.meshes
     for one in frame.snapshot.instances:
         if one.key not in before.moved:
@@ -185,6 +189,34 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
         (*one.centre, -1.0 - np.tan(one.radius) if one.kind == lights.SUN else one.reach) for one in lamps
     ]  # fmt: skip
     return np.array(rows, np.float64)
+
+
+def _most(frame: Frame, before: Before) -> float:
+    """How many pictures light of the picture before counts for at most, by how far lamps have moved."""
+    if not before.lamps:
+        return float(MANY)
+    if frame.receivers is None or not len(frame.receivers.distance):
+        return 0.0
+    places = (frame.receivers.low + frame.receivers.high) / 2 + frame.geometry.origin
+    moved = [(_straight_light(old, places), _straight_light(new, places)) for old, new in before.lamps]
+    change = sum(np.linalg.norm(now - then, axis=1).mean() for then, now in moved)
+    light = sum(max(np.linalg.norm(one, axis=1).mean() for one in pair) for pair in moved)
+    return min(LAMPS, LAG * light / max(change, 1e-30))
+
+
+def _straight_light(lamp: Light, places: np.ndarray) -> np.ndarray:
+    """(N, 3) vectors along which a lamp's light comes to places (N, 3) of the world, as long as it is strong there:
+    about W/m2. Cones of spots have soft edges here."""
+    strength = float(np.abs(lamp.strength).mean()) or 1.0
+    ahead = -lamp.matrix[:3, 2] / max(np.linalg.norm(lamp.matrix[:3, 2]), 1e-30)
+    if lamp.kind == "SUN":
+        return np.broadcast_to(strength * ahead, places.shape)
+    way = places - lamp.matrix[:3, 3]
+    distance = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-3)
+    way = way / distance
+    towards = np.maximum(way @ ahead, 0.0)[:, None]
+    narrow = {"AREA": 1.0, "SPOT": np.clip((np.pi / max(lamp.spot_angle, 1e-2)) ** 2, 1.0, 200.0)}.get(lamp.kind, 0.0)
+    return strength * way * towards**narrow / (4.0 * np.pi * distance**2)
 
 
 def _other_light(frame: Frame) -> bool:

@@ -3,7 +3,7 @@
 // Both without the surface's colour. The picture before is looked up where the camera and the object were then, in four
 // pixels, of which those count that lie on the same surface: on its tangent plane, near the place, facing alike. `before_table`:
 // rows x, y, w of its view; its render origin from this one's, w: objects that have moved; how many lamps, y: 1 where there
-// is other light than theirs; nine texels of each object: from where it is to where it was, and to its box, within -1..1,
+// is other light than theirs, z: pictures that light counts for at most, since lamps have moved; nine texels of each object: from where it is to where it was, and to its box, within -1..1,
 // now and then; a texel of each lamp: place and reach, or the way to a sun and -1 - tangent of its radius.
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
@@ -213,6 +213,7 @@ void main()
   vec2 counts = vec2(0.0);
   if (found.weight > 0.0) {
     counts = min(found.counts, (moved > 0) ? vec2(within ? most_moved : most_still, most_moved) : vec2(most_still));
+    counts = min(counts, vec2(table(4).z));
     if (moved > 0 && may_have_changed(position.xyz, shift, moved)) {
       counts.x = min(counts.x, most_moved);
       vec3 low;

@@ -12,7 +12,8 @@ from addon.frame.run import Renderer
 from addon.gfx import images
 from addon.lighting import probes
 from addon.snapshot import SnapshotCache, camera_of_scene, take
-from addon.techniques.history import FEW, _between, _into_box
+from addon.snapshot.scene import Light
+from addon.techniques.history import FEW, LAMPS, _between, _into_box, _straight_light
 from addon.ui.properties import settings_of
 from tests.viewport.region import Region
 
@@ -61,6 +62,29 @@ def test_an_edit_of_a_lamp_gives_history_up(scene, drafts):
     next(one for one in scene.objects if one.type == "LIGHT").data.energy *= 2
     frame = drafts(moved=0.02)
     assert frame.before is None and samples_behind(frame).max() == 1.0
+
+
+def test_a_lamp_that_moves_keeps_as_much_history_as_it_leaves_light_alike(scene, drafts):
+    lamp = next(one for one in scene.objects if one.type == "LIGHT")
+    for _ in range(6):
+        lamp.location.x += 0.02
+        frame = drafts()
+    assert len(frame.before.lamps) == 1 and frame.before.turn == 5
+    assert 2.0 < samples_behind(frame).max() <= LAMPS + 1
+    lamp.location.x += 50.0
+    frame = drafts()
+    assert samples_behind(frame).max() < 1.5
+
+
+def test_light_of_a_lamp_follows_the_inverse_square():
+    """Closed form: half as far, four times as strong, from where the lamp stands; a sun's is the same everywhere."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = 0.0, 0.0, 4.0
+    places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
+    lamp = Light("a", "a", "POINT", matrix, np.full(3, 4.0 * np.pi))
+    np.testing.assert_allclose(_straight_light(lamp, places), [(0, 0, -1 / 16), (0, 0, -1 / 4)], atol=1e-12)
+    sun = replace(lamp, kind="SUN")
+    np.testing.assert_allclose(_straight_light(sun, places), np.tile([0.0, 0.0, -4.0 * np.pi], (2, 1)), atol=1e-12)
 
 
 def test_history_moves_with_an_object(drafts):
