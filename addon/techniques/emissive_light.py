@@ -176,14 +176,13 @@ class EmissiveLight(Technique):
         """Whether pixels draw points of their own, and where."""
         provider = frame.service(VisibilityProvider)
         patches = provider is not None and provider.serves_every_source(frame)
-        # Maps ask the material of a layer itself, in each place and channel; rays know it by cells.
-        layered = any(material.uneven or material.tinted for material in frame.materials.compiled)
-        if patches or layered or frame.settings.schedule.is_draft or not frame.snapshot.casts_shadows:
+        if patches or frame.settings.schedule.is_draft or not frame.snapshot.casts_shadows:
             return
         if not self._triangles.may_be_own or frame.hierarchy("shadow") is None:
             return
 
-        if not self._triangles.near:
+        # Maps ask the material of a layer itself, rays know it by cells: those alone that add what maps leave out.
+        if not self._triangles.near or any(material.uneven for material in frame.materials.compiled):
             count = self._count(frame.settings) * frame.settings.samples
             self._left_out = SPREAD * self._triangles.spacing(count)
             self._beside = self._triangles.beside(self._left_out)

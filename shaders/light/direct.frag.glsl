@@ -165,6 +165,11 @@ void main()
         }
 #endif
         visibility = light_visibility(light, pixel, start, facing);
+#ifdef OWN_POINTS
+        vec3 layers = layers_color(1e30);  // that the ray has passed
+        from_diffuse *= layers;
+        from_glossy *= layers;
+#endif
       }
       vec3 passing = light_through_media(light, pixel, s.position, towards);
       from_diffuse *= passing;

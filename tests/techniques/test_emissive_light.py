@@ -258,3 +258,18 @@ def test_beside_a_strip_that_is_near_to_few_pixels_few_samples_have_no_blotches(
     assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
     assert np.sqrt(((ratio - 1) ** 2).mean()) < 0.035  # .052 with points of all alone
     assert np.sqrt(((ratio - 1) ** 2)[:, 12:20, 8:24].mean()) < 0.07  # .119
+
+
+def test_a_coloured_pane_colours_light_of_points_of_each_pixels_own(floor):
+    """Rays take the colours of what they pass, where all light of a near panel comes by them."""
+    passed = (0.9, 0.6, 0.3)
+    panel(floor, z=0.25)
+    pane = floor.material("ShaderNodeBsdfTransparent", Color=(*passed, 1))
+    sheet = [(x, y, 0.1) for x, y in ((-3, -3), (3, -3), (3, 3), (-3, 3))]
+    floor.mesh(sheet, [(0, 1, 2, 3)], material=pane).visible_camera = False
+    source = model.area((0, 0, 0.25), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    expected = model.irradiance(source, receivers(1)).reshape((*SIZE, 1)) * np.array(passed)
+    found = floor.render(8, SIZE)["diffuse_direct"][..., :3] * np.pi
+    assert "of each pixel's own" in str(floor.ledger.row("emissive_light").choices)
+    np.testing.assert_allclose(found.mean((0, 1)), expected.mean((0, 1)), rtol=0.015)
+    assert np.sqrt(((found - expected) ** 2).mean((0, 1)) / (expected**2).mean((0, 1))).max() < 0.4
