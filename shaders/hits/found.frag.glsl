@@ -72,7 +72,8 @@ void main()
   vec3 sum = vec3(0.0);
   // A transparent film has a hole where clear glass shows the world: in alpha, how large.
   bool hole = ray_number > 0 && met.w == 0.0 && path_is_clear(code);
-  bool beyond = path_is_bent(code) && path_mirrors(code) > 0;
+  // Frosted glass has asked for lights itself, and has a density of its own.
+  bool beyond = path_is_bent(code) && path_mirrors(code) > 0 && travelled > 0.0;
   if (ray_number > 0) {
     sum += light_found(start, along.xyz, path_is_bent(code), beyond, along.w, travelled, limit, !hole);
   }

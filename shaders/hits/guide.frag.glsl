@@ -4,6 +4,7 @@
 // another.
 #include "lib/gbuffer.glsl"
 #include "hits/path.glsl"
+#include "hits/onward.glsl"
 
 void main()
 {
@@ -23,7 +24,7 @@ void main()
   }
 #endif
   Surface s = SURFACE_READ(pixel);
-  bool goes_on = s.kind == LOBE_REFRACTION || s.glossy_roughness <= shaded_roughness;
+  bool goes_on = lobe_goes_on(s);
   vec3 of_lobe = (s.kind == FRESNEL_DIELECTRIC || goes_on) ? vec3(0.0) : s.glossy_weight;
   vec3 color = min(path.rgb, vec3(1.0)) * (s.diffuse + of_lobe + min(s.emission, vec3(1.0)));
   float bright = luminance(color);

@@ -10,12 +10,14 @@
 #include "lib/soft_lobe.glsl"
 #endif
 #include "hits/path.glsl"
+#include "hits/onward.glsl"
 
 struct Receiver {
   Surface surface;
   vec3 viewer;
   bool shines;     // has a lobe of microfacets that light samples can find
   bool bends;
+  bool within;     // glass mirrors, whose rays bend where light samples would pass straight
   bool followed;   // by a ray
   bool ended;      // would be, but for the number of bounces: shows nothing
   int mirrored;    // by so many surfaces on the way to the camera
@@ -98,7 +100,7 @@ vec3 direct_light(Receiver r, uint salt)
 #endif
   float reach = light_reach(light, origin, chosen_direction);
   ivec2 hit;
-  bool glass_stops = r.bends || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
+  bool glass_stops = r.bends || r.within || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
   bool looks = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0;
   bool blocked = looks && trace_layers(origin, chosen_direction, reach, reach, salt, glass_stops, true, hit) < reach;
   chosen_light *= looks ? layers_color(1e30) : vec3(1.0);
@@ -164,7 +166,8 @@ void main()
 #endif
   r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
   r.mirrored = path_mirrors(code);
-  bool goes_on = r.bends || r.surface.glossy_roughness <= shaded_roughness;
+  bool goes_on = lobe_goes_on(r.surface);
+  r.within = mirrors_within(r.surface);
   r.followed = has_lobe && goes_on && ray_number + 1 < rays
                && (r.bends ? ray_number < interfaces : r.mirrored < mirrors);
   r.ended = has_lobe && goes_on && !r.followed;

@@ -6,6 +6,7 @@
 #include "lib/refraction.glsl"
 #include "trace/origin.glsl"
 #include "hits/path.glsl"
+#include "hits/onward.glsl"
 
 void main()
 {
@@ -80,7 +81,7 @@ void main()
 #endif
     code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0) + (edited ? PATH_EDITED : 0);
   }
-  else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && mirrored < mirrors) {
+  else if (s.kind <= FRESNEL_F82 && lobe_goes_on(s) && mirrored < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);
     direction = lobe_sample(lobe, u, weight);
     lobe_reflection(lobe, direction, density);

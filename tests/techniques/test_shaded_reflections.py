@@ -131,6 +131,36 @@ def test_light_behind_a_pane_is_found_once(stage, roughness):
     assert found.mean() == pytest.approx(1.0, abs=0.03)
 
 
+def frosted(stage, roughness):
+    """A cube of frosted glass, seen from aslant and above."""
+    corners = [(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (1, 5, 7, 3), (0, 2, 6, 4)]
+    glass = stage.material("ShaderNodeBsdfGlass", Roughness=roughness, IOR=1.5)
+    made = stage.mesh(corners, faces, material=glass)
+    stage.camera((6.6, -6.6, 5.0), (1.08, 0, 0.785), angle=0.25)
+    return made
+
+
+@pytest.mark.parametrize("roughness", [0.28, 0.5])
+def test_frosted_solids_vanish_in_a_furnace(stage, roughness):
+    """Light samples from within pass the faces on straight lines, where rays of lobes bend: one of both counts."""
+    frosted(stage, roughness)
+    stage.world(strength=1.0)
+    shown = stage.render(16, (24, 18), bounces=12)["combined"][6:-6, 8:-8, :3]
+    assert shown.mean() == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.slow
+def test_lamps_shine_into_frosted_solids(stage):
+    """Most of what one sees there has been mirrored by inner faces."""
+    frosted(stage, 0.5)
+    stage.light("POINT", (4.0, 1.0, 5.9), energy=1000, shadow_soft_size=1.0)
+    own, truth = (stage.render(n, (24, 18), engine=e, bounces=12) for e, n in (("CANDELA", 64), ("CYCLES", 1024)))
+    through = [images["transmission_indirect"].mean() for images in (own, truth)]
+    print(f"light through the solid {through[0]:.4f}, in Cycles {through[1]:.4f}")
+    assert through[0] == pytest.approx(through[1], rel=0.25)
+
+
 def gleaming(stage, tint):
     """A mirror that shines by itself, so that what it shows is a part of its light alone."""
     white = (1, 1, 1, 1)
