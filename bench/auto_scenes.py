@@ -1,6 +1,7 @@
-"""Twenty scenes on which what Auto takes is checked (`bench/auto.py`): none is a sample, none decided a rule of Auto.
+"""Twenty-five scenes on which what Auto takes is checked (`bench/auto.py`): none is a sample, none decided a rule.
 
-Ten are rooms, where light arrives by walls, and ten stand in the open, where shadows decide. All are made of numbers.
+Twelve are rooms, where light arrives by walls, and thirteen stand in the open, where shadows decide. All are made of
+numbers.
 """
 
 from __future__ import annotations
@@ -279,12 +280,68 @@ def stage() -> Set:
     return made
 
 
+def blinds() -> Set:
+    made = Walls((0, -2.6, 1.4), (0, 1, 0.8), 1.1)
+    made.room(1.8, 2.6, 2.4, (WHITE, WHITE), roof=False)
+    for y in np.arange(-2.6, 2.6, 0.26):
+        made.block((-1.8, y, 2.4), (1.8, y + 0.14, 2.42), (0.5, 0.4, 0.3, 1))
+    made.block((-0.6, 0.6, 0), (0.4, 1.2, 0.7), RED)
+    made.sun((1, 0.6, 4), 1.5, 8.0)
+    return made
+
+
+def chairs() -> Set:
+    made = Walls((0, -3.2, 1.6), (0, 0.8, 0.5), 1.0)
+    made.room(2.4, 3.4, 2.6)
+    for x, y in ((-1.4, 0), (-0.2, 0.8), (1.1, 0.1), (0.4, -0.9)):
+        for dx, dy in ((0, 0), (0.4, 0), (0, 0.4), (0.4, 0.4)):
+            made.block((x + dx, y + dy, 0), (x + dx + 0.05, y + dy + 0.05, 0.45), (0.4, 0.25, 0.15, 1))
+        made.block((x, y, 0.45), (x + 0.45, y + 0.45, 0.5), (0.4, 0.25, 0.15, 1))
+        made.block((x, y + 0.4, 0.5), (x + 0.45, y + 0.45, 1.0), (0.4, 0.25, 0.15, 1))
+    made.lamp("AREA", (-1, 0, 2.55), size=0.5, energy=50.0)
+    made.lamp("AREA", (1, 0.8, 2.55), size=0.5, energy=50.0)
+    return made
+
+
+def arcade() -> Set:
+    made = Walls((-1.5, -6, 1.7), (1, 2, 1.2), 0.9)
+    made.floor(30)
+    for y in np.arange(-4, 9, 1.6):
+        made.add("cylinder", (2, y, 1.3), vertices=24, radius=0.2, depth=2.6, material=_painted(WHITE))
+    made.block((1.7, -4.5, 2.6), (2.3, 9, 3.1))
+    made.block((4, -4.5, 0), (4.3, 9, 3.1), (0.6, 0.5, 0.4, 1))
+    made.sun((-3, -1, 3), 2.5)
+    made.sky((0.5, 0.7, 1), 0.5)
+    return made
+
+
+def crates() -> Set:
+    made = Walls((0, -6, 2.4), (0, 0, 0.6), 0.8)
+    made.floor(16, _painted((0.5, 0.5, 0.5, 1)))
+    random = np.random.default_rng(8)
+    for _ in range(14):
+        x, y, side = random.uniform(-2.2, 2.2), random.uniform(-1.5, 2.5), random.uniform(0.3, 0.8)
+        made.add("cube", (x, y, side / 2), (0, 0, random.uniform(0, 3)), size=side, material=_painted(RED))
+    made.lamp("AREA", (2.5, -1, 4), (0, 0, 0), shape="DISK", size=1.2, energy=500.0)
+    return made
+
+
+def lanterns() -> Set:
+    made = Walls((0, -5, 1.8), (0, 0, 0.6), 0.9)
+    made.floor(16)
+    for x in (-1.6, 0.0, 1.6):
+        made.add("cone", (x, 0.6, 0.5), vertices=20, radius1=0.3, depth=1.0, material=_painted(GREEN))
+        made.lamp("POINT", (x - 0.5, -0.6, 1.6), shadow_soft_size=0.1, energy=60.0, use_soft_falloff=False)
+    return made
+
+
 ROOMS: dict[str, Callable[[], Set]] = {
     one.__name__: one
-    for one in (corridor, closet, attic, cellar, shelf, pillars, lampshade, glossy_room, stairs, tubes)
+    for one in (corridor, closet, attic, cellar, shelf, pillars, lampshade, glossy_room, stairs, tubes, blinds, chairs)
 }
 OPEN: dict[str, Callable[[], Set]] = {
-    one.__name__: one for one in (tree, hedge, fence, canyon, pergola, rocks, ball, rings, heads, stage)
+    one.__name__: one
+    for one in (tree, hedge, fence, canyon, pergola, rocks, ball, rings, heads, stage, arcade, crates, lanterns)
 }
 SCENES = ROOMS | OPEN
 

@@ -16,11 +16,16 @@ WORLD = "world"  # its name among the rates
 @dataclass
 class LightRates(Service):
     """Rates of lights by key, where it is not one point per sample; and what each probe of a grid sees of the world,
-    (rows, columns, guide rows, guide columns), None where nobody has looked."""
+    (rows, columns, guide rows, guide columns), None where nobody has looked.
+
+    `variance`: relMSE that one point of a light leaves; `of_points`: rates with which points of every light would be
+    drawn. Both by key, empty where nobody has measured."""
 
     name = "rates"
     by_light: dict[str, Rate] = field(default_factory=dict)
     world_seen: np.ndarray | None = None
+    variance: dict[str, float] = field(default_factory=dict)
+    of_points: dict[str, Rate] = field(default_factory=dict)
 
 
 def rate_of(frame: Frame, key: str) -> Rate:

@@ -116,7 +116,7 @@ class LightProbes(Technique):
         if guided is not None:
             found.world_seen = self._guide(frame, guided)
         if shares:
-            found.by_light = self._share_out(frame, lit, trials, found.world_seen)
+            self._share_out(frame, lit, trials, found)
 
     def _rays(self, frame: Frame) -> dict:
         hierarchy = frame.hierarchy()
@@ -170,11 +170,12 @@ class LightProbes(Technique):
         emitters = frame.emitters if len(frame.emitters) <= MOST_LIGHTS else []
         return emitters, int(np.clip(RAYS_OF_PROBE // max(len(emitters) + lit, 1), FEWEST_POINTS, POINTS))
 
-    def _share_out(self, frame: Frame, lit: bool, trials: list[Reading], seen: np.ndarray | None) -> dict[str, Rate]:
-        """Rates of the lights by key, and of WORLD. `seen`: what probes see of the world, where it is guided."""
+    def _share_out(self, frame: Frame, lit: bool, trials: list[Reading], into: LightRates) -> None:
+        """Rates of the lights and of WORLD, and what they follow from, into `into`."""
         emitters, asked_points = self._asked(frame, lit)
         if not emitters and not lit:
-            return {}
+            return
+        seen = into.world_seen  # where the world is guided
         found = [drawn.pixels()[..., :2].astype(np.float64) for drawn in trials]
         if seen is not None:
             repeat = SPREAD_PROBES[0] // seen.shape[1]
@@ -186,25 +187,34 @@ class LightProbes(Technique):
         places = [_place(emitter) for emitter in emitters] + [WORLD] * lit
         distinct = list(dict.fromkeys(places))
         joint = [sum(np.sqrt(v) for v, place in zip(variance, places) if place == one) ** 2 for one in distinct]
-        samples = frame.settings.samples
         share = relative_share(moments[..., 0])
         film = [EDGES * sum(s for s, place in zip(share, places) if place == one) ** 2 for one in distinct]
         # Soft maps show a light as a whole: few samples need no more of them, but where none has one.
         by_light = frame.plan.runs(ShadowsByLight.name)
         points = frame.plan.runs(AccumulatedMaps.name) or (by_light and all(seen_in_parts(frame, e) for e in emitters))
+        keys = [emitter.light.key for emitter in emitters] + [WORLD] * lit
+        by_place = [self._rates(frame, lit, joint, film, all_points) for all_points in (points, True)]
+        rates, of_points = (dict(zip(distinct, one)) for one in by_place)
+        into.by_light = {key: rates[place] for key, place in zip(keys, places)}
+        into.of_points = {key: of_points[place] for key, place in zip(keys, places)}
+        into.variance = {key: float(joint[distinct.index(place)]) for key, place in zip(keys, places)}
+        frame.count(self, "probing rays", (len(moments) - (seen is not None)) * moments.shape[1] * asked_points)
+
+    def _rates(self, frame: Frame, lit: bool, joint: list, film: list, points: bool) -> list[Rate]:
+        """Rates of lights of the variances `joint`, of which the last is the world's if it is `lit`. `points`: whether
+        points show them, of which few samples need several."""
+        samples = frame.settings.samples
         planned = samples if points else max(samples, USUAL_SAMPLES)
         alone = not frame.plan.fills("indirect")
         asked = frame.settings.get(self, "maps")
         budget = budget_for(joint, planned, paying(asked, planned, alone), film)
-        rates = dict(zip(distinct, allocate(joint, samples, budget, film)))
+        rates = allocate(joint, samples, budget, film)
         if lit:
-            rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD], asked, alone)
+            rates[-1] = directions_for(joint[-1], samples, rates[-1], asked, alone)
         if any(material.transparent or material.soft for material in frame.materials.compiled):
             # Layers and soft lobes are drawn at random in each sample: a light that misses samples would see few.
-            rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
-        frame.count(self, "probing rays", (len(moments) - (seen is not None)) * moments.shape[1] * asked_points)
-        keys = [emitter.light.key for emitter in emitters] + [WORLD] * lit
-        return {key: rates[place] for key, place in zip(keys, places)}
+            rates = [Rate(max(rate.exponent, 0)) for rate in rates]
+        return rates
 
     def _points_of(self, frame: Frame, emitter: lights.Emitter, count: int) -> list[np.ndarray]:
         seed = frame.settings.seed

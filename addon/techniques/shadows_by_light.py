@@ -5,6 +5,7 @@
 | without extent | plain | nothing to filter |
 | widest penumbra below one texel of a plain map | plain | filtered or not, the map shows the same |
 | round and nearer than four radii, or a spot whose size blurs its cone's edge; rays | plain | see below |
+| points of it have the least error times time | plain | see lighting/shadow_costs.py |
 | few silhouette edges before each pixel | edges (depth_complexity.py) | less than equal rays or maps cost |
 | the `important` strongest of the others | variance (vssm.py) | the least error of one map |
 | all others | convolution (cssm.py) with 2 x 2 boxes and one contact ray | a lookup that costs less |
@@ -13,7 +14,9 @@ The widest penumbra of a light is bounded by its angle a from the nearest receiv
 stand in: 2 a s, s the light's distance or the scene's size, whichever is less. A light's strength is the median of its
 unblocked irradiance over the picture's tiles: power, size, distance and the part of the picture that it can reach.
 
-What edges cost is known for this device and this picture (lighting/edge_costs.py); the ledger says what was compared.
+What edges cost is known for this device and this picture (lighting/edge_costs.py), and how much points of a light
+differ where light probes asked (`few_points`): then the least error times time decides between points, edges and maps
+(lighting/shadow_costs.py). The ledger says what was compared.
 
 Auto takes this technique for pictures of one sample in which a light has extent and casts shadows. With more samples
 points of the lights (accumulated_maps.py) converge, and which is better is left to what the benchmark measured. Drafts
@@ -35,12 +38,15 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
-from ..lighting import edge_costs, edge_tiles
+from ..lighting import edge_costs, edge_tiles, shadow_costs
 from ..lighting.caustic_casters import answered
 from ..lighting.edge_costs import FEW_EDGES
 from ..lighting.edge_shadows import NEAR
+from ..lighting.light_rates import WORLD, LightRates
 from ..lighting.loop import tinted_casters
+from ..lighting.maps_or_rays import Compared
 from ..lighting.point_maps import PointMaps
+from ..lighting.shadow_costs import Foreseen, Weighed
 from ..lighting.silhouettes import Extent
 from ..lighting.soft_maps import SoftMaps
 from ..lighting.visibility import VisibilityProvider, drawn_stochastically, has_extent, rays_beside
@@ -51,7 +57,7 @@ from .cssm import ConvolutionSoftShadows
 from .depth_complexity import DepthComplexity
 from .vssm import VarianceSoftShadows
 
-PLAIN = "lights without penumbra: plain maps"
+PLAIN = "lights by points: rays or plain maps"
 EDGES = "soft lights with few edges: depth complexity"
 VARIANCE, CONVOLUTION = "important soft lights: variance maps", "other soft lights: convolution maps"
 
@@ -84,6 +90,7 @@ class ShadowsByLight(PointMaps):
     name = "shadows_by_light"
     label = "Shadow maps by light"
     fills = ("shadow",)
+    requests = (LightRates,)
     params = (
         Param(
             "important", "Important lights", 8,
@@ -95,6 +102,11 @@ class ShadowsByLight(PointMaps):
             "In pictures of one sample, use filtered maps for soft lights; otherwise several hard maps for each",
         ),
         FEW_EDGES,
+        Param(
+            "few_points", "Points where better", True,
+            "In pictures of one sample, use points of a light where these have less error for their time than a soft "
+            "map: where its penumbrae are narrow, and where rays cost little",
+        ),
     )  # fmt: skip
 
     def __init__(self):
@@ -118,7 +130,18 @@ class ShadowsByLight(PointMaps):
             frame.count(self, kind)
         for kind in dict.fromkeys(self._kinds.values()):
             self._providers[kind].begin(frame)
+        self._draw_points(frame)
         frame.provide(self, VisibilityProvider)
+
+    def _draw_points(self, frame: Frame) -> None:
+        """As many points of the lights without soft map as there would be if no light had one."""
+        rates = frame.service(LightRates)
+        if rates is None or not frame.settings.get(self, "few_points") or frame.settings.samples > 1:
+            return
+        by_points = {key for key, kind in self._kinds.items() if kind == PLAIN}
+        alone = by_points == set(self._kinds)
+        chosen = {key: rate for key, rate in rates.of_points.items() if key in by_points or (alone and key == WORLD)}
+        rates.by_light |= chosen
 
     def serving(self, emitter: lights.Emitter) -> PointMaps:
         return self._providers[self._kinds.get(emitter.light.key, PLAIN)]
@@ -136,10 +159,9 @@ class ShadowsByLight(PointMaps):
                 kinds[emitter.light.key] = PLAIN
             else:
                 soft.append(emitter)
-        if soft and self._may_have_edges(frame):
-            served = {emitter.light.key for emitter in soft if self._by_edges(frame, emitter)}
-            kinds |= dict.fromkeys(served, EDGES)
-            soft = [emitter for emitter in soft if emitter.light.key not in served]
+        served = self._weighed(frame, soft) if soft else {}
+        kinds |= served
+        soft = [emitter for emitter in soft if emitter.light.key not in served]
         soft.sort(key=lambda emitter: -strength(frame, emitter))
         for kind in (VARIANCE, CONVOLUTION):
             self._providers[kind].least_side = LEAST_SIDE if len(soft) <= FEW_LIGHTS else SoftMaps.least_side
@@ -172,29 +194,87 @@ class ShadowsByLight(PointMaps):
         self._providers[PLAIN].begin(frame)
         return True
 
+    def _weighed(self, frame: Frame, soft: list[lights.Emitter]) -> dict[str, str]:
+        """EDGES or PLAIN for those of the lights by key that do better so than by soft maps."""
+        edges, kinds = self._may_have_edges(frame), {}
+        weighed = self._weights(frame)
+        if weighed is not None and not edges:
+            self._providers[PLAIN].begin(frame)
+        for emitter in soft:
+            key = emitter.light.key
+            if weighed is not None and key in weighed.rates.variance:
+                kind = self._by_error_and_time(frame, emitter, weighed, edges)
+            else:
+                kind = EDGES if edges and self._by_edges(frame, emitter) else None
+            if kind is not None:
+                kinds[key] = kind
+        return kinds
+
+    def _weights(self, frame: Frame) -> Weighed | None:
+        """What is known of lights' errors, where probes asked and the user wants it weighed."""
+        rates = frame.service(LightRates)
+        known = rates is not None and rates.variance and frame.settings.samples == 1
+        return Weighed(frame.size, rates) if known and frame.settings.get(self, "few_points") else None
+
+    def _by_error_and_time(self, frame: Frame, emitter: lights.Emitter, weighed: Weighed, edges: bool) -> str | None:
+        """The kind with the least error times time; None: a soft map. Silhouettes are looked for where they may win."""
+        key, plain = emitter.light.key, self._providers[PLAIN]
+        views = plain.views(frame, emitter, emitter.middle(), 0)
+        if not views:
+            return None
+        traced = not drawn_stochastically(frame)
+        each = rays_beside(frame, views, plain.resolution(frame))
+        found: dict[str, Foreseen] = {
+            shadow_costs.POINTS: weighed.points(key, each, traced),
+            shadow_costs.MAPS: weighed.maps(key, each, len(views) * self._soft_side(frame) ** 2),
+        }
+        triangles = frame.geometry.triangles
+        if edges and weighed.edges(key, 0.0, triangles).product < min(one.product for one in found.values()):
+            extent = self._extent(frame, emitter)
+            if extent is not None:
+                found[shadow_costs.EDGES] = weighed.edges(key, self._edges_before(frame, extent), triangles)
+        name = min(found, key=lambda one: found[one].product)
+        others = ", ".join(f"{one} {worth}" for one, worth in found.items() if one != name)
+        frame.account.chose(
+            self,
+            emitter.light.name,
+            f"{name}, because error and time of the picture are {found[name]} here, of {others}",
+        )
+        if name == shadow_costs.EDGES:
+            self._edges.serve(emitter, extent)
+        return {shadow_costs.POINTS: PLAIN, shadow_costs.EDGES: EDGES}.get(name)
+
+    def _soft_side(self, frame: Frame) -> int:
+        return max(self._providers[VARIANCE].resolution(frame), LEAST_SIDE)
+
+    def _extent(self, frame: Frame, emitter: lights.Emitter) -> Extent | None:
+        """Of a light that edges may serve."""
+        # A share of a textured lamp does not say which part of it is hidden; nor one number what tints its light.
+        told_apart = frame.lamp_maps.textured(emitter.light) or tinted_casters(frame) or answered(frame, emitter)
+        return None if told_apart else self._edges.suits(frame, emitter)[1]
+
     def _by_edges(self, frame: Frame, emitter: lights.Emitter) -> bool:
         """Whether edges cost so little for this light; then they serve it, and the ledger says why."""
-        # A share of a textured lamp says nothing of which part of it is hidden; nor one number of what tints its light.
-        told_apart = frame.lamp_maps.textured(emitter.light) or tinted_casters(frame) or answered(frame, emitter)
-        extent = None if told_apart else self._edges.suits(frame, emitter)[1]
-        plain = self._providers[PLAIN]
+        extent, plain = self._extent(frame, emitter), self._providers[PLAIN]
         views = plain.views(frame, emitter, emitter.middle(), 0) if extent is not None else []
         if not views:
             return False
-        found = self._compared(frame, extent, views)
+        found = self._compared(frame, extent, rays_beside(frame, views, plain.resolution(frame)))
         frame.account.chose(self, emitter.light.name, found.why)
         if found.by_edges:
             self._edges.serve(emitter, extent)
         return found.by_edges
 
-    def _compared(self, frame: Frame, extent: Extent, views: list) -> edge_costs.EdgesCompared:
-        found, cards = self._edges.silhouettes(frame, extent), self._edges.cards.cards(frame)
-        before = edge_costs.edges_before(frame.receivers, found.wedges)
-        before += edge_costs.OF_CARD * (cards.count if cards is not None else 0)
-        others = rays_beside(frame, views, self._providers[PLAIN].resolution(frame))
-        frame.count(self, "edges", found.count)
-        width, height = frame.size
+    def _compared(self, frame: Frame, extent: Extent, others: Compared) -> edge_costs.EdgesCompared:
+        before, (width, height) = self._edges_before(frame, extent), frame.size
         return edge_costs.compared(width * height, before, others, rays=not drawn_stochastically(frame))
+
+    def _edges_before(self, frame: Frame, extent: Extent) -> float:
+        """How many edges of a light a pixel is asked about, in the mean; cards count as several."""
+        found, cards = self._edges.silhouettes(frame, extent), self._edges.cards.cards(frame)
+        frame.count(self, "edges", found.count)
+        before = edge_costs.edges_before(frame.receivers, found.wedges)
+        return before + edge_costs.OF_CARD * (cards.count if cards is not None else 0)
 
     def release(self) -> None:
         for service in self._providers.values():

@@ -40,10 +40,10 @@ OTHERS = Group("others", "Others", ())
 
 # Parameters that trade one error for another, or that only matter to who compares techniques.
 EXPERT = {
-    "bins", "by", "cells", "centre_test", "contacts", "cutoff", "edge_rays", "extent", "fans", "few_edges", "groups",
-    "guiding", "important", "interleaved", "levels", "lobe_side", "maps", "mode", "most_edges", "near_bounces", "order",
-    "orientations", "prefilter", "refine", "rule", "smooth", "soft_maps", "sparse", "taps", "texels_per_pixel",
-    "thickness", "threshold", "union",
+    "bins", "by", "cells", "centre_test", "contacts", "cutoff", "edge_rays", "extent", "fans", "few_edges",
+    "few_points", "groups", "guiding", "important", "interleaved", "levels", "lobe_side", "maps", "mode",
+    "most_edges", "near_bounces", "order", "orientations", "prefilter", "refine", "rule", "smooth", "soft_maps",
+    "sparse", "taps", "texels_per_pixel", "thickness", "threshold", "union",
 }  # fmt: skip
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from addon.gfx import device
-from addon.lighting import edge_costs
+from addon.lighting import edge_costs, shadow_costs
+from addon.lighting.light_rates import LightRates
 from addon.lighting.maps_or_rays import Compared
+from addon.sources.rates import Rate
 from addon.techniques import shadows_by_light as by_light
 from tests.techniques.test_depth_complexity import in_two_colours
 from tests.techniques.test_shadows import HEIGHT, irradiance
@@ -31,6 +33,7 @@ KINDS = {
 def plate(floor):  # noqa: F811
     floor.scene.candela.slot_shadow = "AUTO"
     floor.scene.candela.shadows_by_light_few_edges = False
+    floor.scene.candela.shadows_by_light_few_points = False
     floor.blocker(*EDGE)
     return floor
 
@@ -152,6 +155,34 @@ def test_edges_that_would_be_many_or_say_too_little_are_left(few_edges, why, mon
         in_two_colours(lamp.data)
     irradiance(few_edges, 1, (32, 32))
     assert by_light.EDGES not in counters(few_edges)
+
+
+def test_points_are_taken_where_soft_maps_are_not_worth_their_time(plate):
+    """The picture is that of points in the slot, and the ledger says what was weighed."""
+    plate.scene.candela.shadows_by_light_few_points = True
+    plate.scene.candela.light_probes_maps = 8.0
+    lamp = plate.light(SOFT[0], (0, 0, HEIGHT), size=0.05)
+    found = irradiance(plate, 1, (32, 32))
+    assert counters(plate) == {by_light.PLAIN: 1}
+    (said,) = plate.ledger.row(NAME).choices
+    assert (
+        said.startswith(f"{lamp.name}: points, because error and time of the picture are ") and "of soft maps" in said
+    )
+    plate.scene.candela.slot_shadow = "accumulated_maps"
+    assert np.array_equal(irradiance(plate, 1, (32, 32)), found)
+
+
+@pytest.mark.parametrize(("side", "variance", "best"), [(64, 0.02, "points"), (64, 4.0, "maps"), (1024, 0.02, "maps")])
+def test_error_times_time_decides(side, variance, best):
+    """Little variance is not worth a map, much is; what a small picture's outlines hide, a large one shows."""
+    device.use(device.MADE_UP["software"])
+    rates = LightRates(variance={"lamp": variance}, of_points={"lamp": Rate(0)})
+    weighed = shadow_costs.Weighed((side, side), rates)
+    each = Compared(rays=1e3 * side, maps=1e6)
+    found = {"points": weighed.points("lamp", each, True), "maps": weighed.maps("lamp", each, 2.0**18)}
+    assert min(found, key=lambda name: found[name].product) == best
+    assert weighed.edges("lamp", 0.0, 0).error < found["maps"].error < found["points"].error
+    device.use(None)
 
 
 def test_edges_before_a_pixel_are_counted_by_wedges():
