@@ -25,11 +25,10 @@ Sources: Ritschel, Grosch and Seidel 2009 (SSDO, the bounce); Therrien, Levesque
 
 Bias (diffuse indirect light), by design: surfaces reach up to a step beyond their edges and hidden sides are
 `thickness` thick: up to a tenth of the light where posts stand close. Metals send nothing on the screen. The last
-bounces before the limit may be counted once more than allowed. Beyond `radius`, steps are wider than what they should
-see, a lit door at the end of a corridor, say, and rays look instead (with the whole screen: .67 of the light there, and
-.95 so). Fails: without rays, what is off the screen or hidden sends nothing (half of the light in the Cornell box, four
-fifths in small rooms). The thesis peels layers and adds four cameras for part of that; rays see all of it. Auto takes
-instant radiosity, whose error goes to zero. Figures: docs/log/2026-11-26-indirect-light.md.
+bounces before the limit may be counted once more than allowed. Beyond `radius` steps are wider than a lit door at the
+end of a corridor, so rays look (.67 of the light to .95). Fails: without rays, what is off the screen or hidden sends
+nothing (up to four fifths); for part of it the thesis peels layers and adds cameras, rays see all. Auto takes instant
+radiosity, whose error goes to zero. Figures: docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
