@@ -20,11 +20,10 @@ differ where light probes asked (`few_points`): then the least error times time 
 
 Auto takes this technique for pictures of one sample in which a light has extent and casts shadows. With more samples
 points of the lights (accumulated_maps.py) converge, and which is better is left to what the benchmark measured. Drafts
-of a moving view keep points too: their maps are drawn in half the time.
-As a whole, a light has one cone and one distance: a spot's cone would stay sharp that its size blurs, and penumbrae of
-a large round light near by are others. Where rays cost no more than maps, points take them.
-
-Few lights have soft maps of 512 texels a side at least. Cost and bias are those of the kinds; each shares one atlas.
+of a moving view keep points too: their maps are drawn in half the time. As a whole, a
+light has one cone and one distance: a spot's cone would stay sharp that its size blurs, and penumbrae of a large round
+light near by are others. Where rays cost no more than maps, points take them. Few lights have soft maps of 512 texels a
+side at least.
 
 Measured with one sample at 128x96 against Cycles, relMSE of the direct diffuse light, by this technique and by points
 with 6 maps per sample: Cornell box 0.036 and 0.059, door ajar 0.066 and 0.63, garden 0.19 and 0.24; colonnade 2.2, 1.9.

@@ -14,7 +14,6 @@ surfaces trace one ray of their lobe. So each direction is estimated once, by th
 diffuse light of this very sample, gloss counted as diffuse, and each bounce sends what the one before brought.
 
 `visibility` POINTS is the thesis's own way, for comparison: points in a half ball, solid where below what is seen.
-
 Sources: Ritschel, Grosch and Seidel 2009 (SSDO, the bounce); Therrien, Levesque and Gilet 2023 (bits for sectors).
 
 | cost | per sample |
