@@ -116,6 +116,7 @@ class CausticMaps:
         self.lights: set[str] = set()  # keys of those that the maps of this or another sample are of
         self._sample: tuple[weakref.ref[Frame], int] | None = None
         self._pending: tuple[LitView, LightView, images.Image] | None = None
+        self._splat: Callable[[Bundle], None] | None = None
         self._receivers = LightBuffers()
         self._map: images.Target | None = None
         self._block: Block | None = None
@@ -142,6 +143,7 @@ class CausticMaps:
         for one in self.maps:
             images.pool.give(one.image)
         self.maps, self._count, self.lights, self._sample = [], 0, set(), None
+        self._pending = self._splat = None
 
     def of(self, frame: Frame) -> list[KeptMaps]:
         """The maps of the sample that `frame` is drawing."""
@@ -152,6 +154,8 @@ class CausticMaps:
     def wants(self, frame: Frame, light: LitView) -> bool:
         """Whether rays of lobes meet surfaces that ask for a map of this view, and there is room for it; of a light
         there are maps of all views or of none."""
+        if self._shares(light):
+            return True
         if frame.service(ShadedLobes) is None:
             return False
         return self._count < MOST or caustic_casters.key_of(light.emitter) in self.lights
@@ -159,12 +163,20 @@ class CausticMaps:
     def add(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, photons: Photons
     ) -> Callable[[Bundle], None]:
-        """Draw what the light's view shows; the function that is returned splats a bundle into its map, and `keep` ends
-        it."""
+        """Draw what the light's view shows, or take the map of its other points; the function that is returned splats a
+        bundle into it. `keep` ends the map that was added last."""
+        if self._shares(light):
+            return self._splat
+        self.keep(frame, technique)
         low, high = frame.geometry.bounds_min, frame.geometry.bounds_max
         corners = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
         side = side_of(frame)
-        view = widened(light.view, EXTENT, corners[None] - frame.geometry.origin, side, self._shift)
+        seen_from, extent = light.view, EXTENT
+        if light.middle is not None:
+            # Light of a point beside the middle lands beside what that shows, by less than this at any distance.
+            seen_from = light.middle
+            extent *= max(1.0, light.emitter.reach / float(np.linalg.norm(seen_from.high - seen_from.low)))
+        view = widened(seen_from, extent, corners[None] - frame.geometry.origin, side, self._shift)
         block, seen = self._receivers.receivers(frame, technique, view, casters.materials)
         caught = {name: seen[name.replace("receiver", "surface")] for _, name in MAP}
         if self._map is None or self._map.size != (side, side):
@@ -177,11 +189,17 @@ class CausticMaps:
             splats.draw(INTO_MAP, self._map, records, textures=caught, blocks={"map_view": block})
             frame.count(technique, "passes")
 
-        self._pending = (light, view, caught["receiver_position"])
+        self._pending, self._splat = (light, view, caught["receiver_position"]), splat
         return splat
 
+    def _shares(self, light: LitView) -> bool:
+        """Whether this view's photons go into the map that was added last."""
+        return self._pending is not None and light.middle is not None and self._pending[0].middle is light.middle
+
     def keep(self, frame: Frame, technique: Technique) -> None:
-        """Keep the map that was splatted last."""
+        """Keep the map that was splatted last, if there is one."""
+        if self._pending is None:
+            return
         light, view, position = self._pending
         self._pending = None
         values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}

@@ -47,7 +47,7 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.reflectance import Reflectance
-from . import caustic_casters
+from . import caustic_casters, photon_grids
 from .asked import asked
 from .caustic_sources import sources_of
 from .glass_interfaces import most_interfaces, upload_interfaces
@@ -108,7 +108,8 @@ CHOICES = 0.569840291  # from one interface's number to the next, as in caustics
 WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
 VERY_WIDE, MANY = 0.3, 128  # and from which on its image is wide, too: below so many samples it has several points
 MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
-LEAST_SIDE = 48
+LEAST_SIDE, LEAST_PART = 48, 32  # photons along a side where points share a grid, and where that is a coarser one
+MOST_REACH = 2.0  # of a light, in diagonals of the casters, whose points share a map
 SPREAD_SIDE = 64  # where nothing makes light converge
 LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
 
@@ -126,6 +127,7 @@ class LitView:
     weight: float  # of the point's photons: they stand for the samples that have none
     strata: int = 0  # points of it that share out the choices at inner faces; 0: not known; -1: the likelier way alone
     samples: int = 0  # of the picture, where each half of them shares out its number over half of these points
+    middle: LightView | None = None  # from the light's middle, where that serves the map of all points of a sample
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,14 @@ def _half_width(emitter: lights.Emitter) -> float:
     if emitter.kind == lights.SUN:
         return float(np.tan(min(emitter.radius, 1.5)))
     return float(np.sqrt(emitter.area / np.pi)) if emitter.has_span else emitter.radius
+
+
+def middle_view(emitter: lights.Emitter, low: np.ndarray, high: np.ndarray, size: float) -> LightView | None:
+    """A lamp's view from its middle past the casters, where what its other points send there lands in it, too."""
+    if emitter.light is None or emitter.kind == lights.SUN or emitter.reach > MOST_REACH * np.linalg.norm(high - low):
+        return None
+    found = views_of(emitter, emitter.middle(), low, high, SPREAD_SIDE, (0.5, 0.5), size)
+    return found[0] if len(found) == 1 else None
 
 
 def drawn_in(emitter: lights.Emitter, sample: np.ndarray, count: int) -> np.ndarray:
@@ -213,36 +223,43 @@ class Photons:
         self._others = sources_of(frame, casters)
 
     def views(
-        self, frame: Frame, casters: caustic_casters.Casters, side: int, turn: tuple[int, int] | None = None
-    ) -> Iterator[LitView]:
-        """Views of the lights whose turn it is in this sample, `side` photons along each side. `turn`: how many samples
-        had photons before, and how many have in all, where not all samples do and whoever asks weighs them."""
+        self, frame: Frame, casters: caustic_casters.Casters, side: int, turn: tuple[int, int] | None = None,
+        fitted: bool = False,
+    ) -> Iterator[LitView]:  # fmt: skip
+        """Views of the lights whose turn it is in this sample, `side` photons along each side; `fitted`: at most that
+        many, by what shows (photon_grids.py). `turn`: how many samples had photons before, and how many have in all,
+        where not all samples do and whoever asks weighs them."""
         reflected = (REFLECTED,) if frame.snapshot.film.caustics_reflective else ()
         alone = frame.settings.schedule.known_total and frame.settings.samples == 1
         whole = frame.settings.schedule.known_total
+        boxes = list(caustic_casters.boxes_of(frame, casters))
+        most = min(side, SPREAD_SIDE) if casters.spreads else side
+        answered, grids = self._rounds(frame, casters)[0], {}
+        if fitted and answered and boxes:
+            grids = {id(one): row for one, row in zip(answered, photon_grids.sides(frame, answered, boxes, most))}
         for emitter, index, count, weight in self._turns(frame, casters, turn):
             bends = casters.refracting and caustic_casters.key_of(emitter) in casters.bent
             lobes = ((REFRACTED,) if bends else ()) + reflected
-            boxes = list(caustic_casters.boxes_of(frame, casters))
             sharing, of_turns = count, 0
             if turn is not None and count > 1:
                 # Sample 0 has its photons before it is known how many others do: those are a set without it.
                 index, sharing, of_turns = max(index - 1, 0), count - (index > 0), frame.settings.samples
-            parts = _points(emitter, boxes, sharing)
-            parts = min(parts, max(MOST_POINTS // sharing, 1)) if casters.spreads else parts
-            strata = sharing * parts if whole else 0  # 1: see _drawn
-            strata = -1 if of_turns and sharing == count else strata
-            grid, least = (min(side, one) for one in ((SPREAD_SIDE, 32) if casters.spreads else (side, LEAST_SIDE)))
-            texels = max(round(grid / np.sqrt(parts)), least)
-            for number in range(index * parts, (index + 1) * parts):
-                middle = alone and parts == 1
-                drawn = frame.random_volume("light", number, evenly=parts > 1 and emitter.is_flat)
-                sample = emitter.middle() if middle else drawn_in(emitter, emitter.sample(*drawn), count * parts)
-                shift = frame.random("caustics/grid", number)
-                for low, high in boxes:
+            for (low, high), grid in zip(boxes, grids.get(id(emitter), [most] * len(boxes))):
+                parts = _points(emitter, [(low, high)], sharing)
+                parts = min(parts, max(MOST_POINTS // sharing, 1)) if casters.spreads else parts
+                strata = sharing * parts if whole else 0  # 1: see _drawn
+                strata = -1 if of_turns and sharing == count else strata
+                shown = middle_view(emitter, low, high, frame.geometry.size) if parts > 1 else None
+                finest = round((32 if casters.spreads else LEAST_SIDE) * grid / most)
+                texels = max(round(grid / np.sqrt(parts)), min(max(finest, LEAST_PART), grid))
+                for number in range(index * parts, (index + 1) * parts):
+                    middle = alone and parts == 1
+                    drawn = frame.random_volume("light", number, evenly=parts > 1 and emitter.is_flat)
+                    sample = emitter.middle() if middle else drawn_in(emitter, emitter.sample(*drawn), count * parts)
+                    shift = frame.random("caustics/grid", number)
                     for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):
                         shared = emitter, sample, view, lobes, number, count * parts, weight / parts
-                        yield LitView(*shared, strata, of_turns)
+                        yield LitView(*shared, strata, of_turns, shown)
 
     def _rounds(self, frame: Frame, casters: caustic_casters.Casters) -> tuple[list[lights.Emitter], int]:
         """The lights that are answered for, and how many samples have photons of all of them. Where many lights see

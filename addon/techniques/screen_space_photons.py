@@ -121,9 +121,11 @@ class ScreenSpacePhotons(Technique):
         turn = self._turns.turn(frame) if self._turns.may_rest else None
         with self._turns.drawing(frame) as drawing:
             target = images.Target((drawing.images(0)["radiance.diffuse_indirect"],))
-            for light in self._photons.views(frame, self._casters, side, turn):
+            for light in self._photons.views(frame, self._casters, side, turn, fitted=True):
                 self._add(frame, target, light, maps if renews else None)
                 yield
+            if renews:
+                maps.keep(frame, self)
             drawing.done(0)
 
     def _add(self, frame: Frame, target: images.Target, light: LitView, maps: CausticMaps | None) -> None:
@@ -144,8 +146,6 @@ class ScreenSpacePhotons(Technique):
             frame.count(self, "passes")
             if at_hits:
                 into_kept(bundle)
-        if at_hits:
-            maps.keep(frame, self)
 
     def release(self) -> None:
         self._photons.release()

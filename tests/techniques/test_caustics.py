@@ -10,7 +10,7 @@ import pytest
 
 from addon.frame import shares
 from addon.frame.ledger import RAN, SKIPPED
-from addon.lighting import caustic_casters, photons
+from addon.lighting import caustic_casters, photon_grids, photons
 from addon.lighting.caustic_casters import grown
 from addon.lighting.caustic_maps import CausticMaps
 from addon.lighting.light_views import groups
@@ -705,7 +705,7 @@ def test_odd_casters_leave_finite_light(stage, technique_name, build):
     assert images[0] == pytest.approx(images[1], rel=1e-3, abs=1e-5)  # sums in another order
 
 
-def seen_directly_and_in_a_mirror(stage, technique, ior, samples=4):
+def seen_directly_and_in_a_mirror(stage, technique, ior, samples=4, size=0.0):
     """What a floor below a glass ball shows from above, and in a mirror above a camera that looks up."""
     stage.floor(1.5)
     made = ball(stage, glass(stage, ior), place=(0, 0, 1.0))
@@ -714,7 +714,10 @@ def seen_directly_and_in_a_mirror(stage, technique, ior, samples=4):
         (-2, -2), (2, 2), 4.0, material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
     )
     mirror.visible_camera = True
-    stage.light("SPOT", location=(0, 0, 3.5), shadow_soft_size=0.2, spot_size=0.6, spot_blend=0.0)
+    if size:
+        stage.light("AREA", location=(0, 0, 3.5), size=size)
+    else:
+        stage.light("SPOT", location=(0, 0, 3.5), shadow_soft_size=0.2, spot_size=0.6, spot_blend=0.0)
     camera = stage.camera_above(1.6, height=2.5)
     stage.scene.candela.slot_indirect = "OFF"
     stage.scene.candela.slot_caustics = technique
@@ -736,6 +739,44 @@ def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
     assert mirrored.sum() == pytest.approx(seen.sum(), rel=0.05)
     spread = [float((one * np.hypot(*places((48, 48), 1.6)) ** 2).sum() / one.sum()) for one in (seen, mirrored)]
     assert spread[1] == pytest.approx(spread[0], rel=0.1)
+
+
+@pytest.mark.slow
+def test_points_of_a_wide_lamp_share_a_map_that_has_the_light_of_all(stage, monkeypatch):
+    kept, keep = [], CausticMaps.keep
+    monkeypatch.setattr(CausticMaps, "keep", lambda self, *given: kept.append(self._pending) or keep(self, *given))
+    seen, mirrored = seen_directly_and_in_a_mirror(stage, PHOTONS, 1.5, samples=2, size=1.0)
+    # One of the ball a sample and picture, for 8 points; the mirror beside the lamp is seen by faces of cubes.
+    assert sum(one is not None and one[0].middle is not None for one in kept) == 2 * 2
+    assert mirrored.sum() == pytest.approx(seen.sum(), rel=0.05)
+    assert mirrored[16:32, 16:32].sum() == pytest.approx(seen[16:32, 16:32].sum(), rel=0.05)
+
+
+@pytest.mark.parametrize(("away", "width"), [(3.5, 96), (2.5, 96), (1.5, 96), (9.0, 96)])
+def test_grids_are_as_fine_as_pixels_can_show(away, width):
+    """Two photons a pixel of a box of 1 m, seen by a right angle from `away`, less two of its diagonals; from 64 to
+    160."""
+    pixels = width / (2.0 * (away - 2.0)) if away > 2.0 else np.inf
+    assert grids(away, width, [10.0])[0, 0] == round(np.clip(2.0 * pixels, 64, 160))
+
+
+def test_grids_have_photons_by_the_third_root_of_what_they_carry():
+    found = grids(0.0, 1000, [80.0, 10.0, 0.001])[:, 0]
+    assert tuple(found) == (160, 80, 64)
+
+
+def grids(away, width, watts, side=160):
+    """Of lamps 2 m above a box of 1 m of diagonal."""
+    matrix = np.eye(4)
+    matrix[2, 3] = away
+    camera = SimpleNamespace(frame=(-1, 1, -1, 1), kind="PERSPECTIVE", matrix=matrix, from_above=False)
+    frame = SimpleNamespace(view=SimpleNamespace(camera=camera, film=SimpleNamespace(width=width), origin=np.zeros(3)))
+    lamps = [
+        SimpleNamespace(light=1, kind=0, power=one, position=lambda at: np.array([0, 0, 2.0]), middle=lambda: None)
+        for one in watts
+    ]
+    half = np.full(3, 0.5 / np.sqrt(3))
+    return photon_grids.sides(frame, lamps, [(-half, half)], side)
 
 
 @pytest.mark.slow
