@@ -50,6 +50,23 @@ def octahedral(normal: np.ndarray) -> np.ndarray:
     return np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)
 
 
+# Numbers beside a direction, in the last bits of both of its own; shaders/lib/gbuffer.glsl has the same.
+BESIDE_GRID, BESIDE_BITS = 65536.0, 128.0
+LIFT_STEPS, LIFT_OCTAVES, LIFT_FIRST = BESIDE_BITS**2 - 1.0, 64.0, 40.0
+
+
+def octahedral_with_lift(normal: np.ndarray, lift: np.ndarray) -> np.ndarray:
+    """(N, 2) float32 of unit vectors and lengths (N,), m, 0 for none: lift_encode in shaders/lib/gbuffer.glsl.
+    Directions without a length must be stored so, too: `octahedral` alone leaves any length in their last bits."""
+    with np.errstate(divide="ignore"):
+        code = np.floor((np.log2(lift) + LIFT_FIRST) * (LIFT_STEPS / LIFT_OCTAVES) + 0.5)
+    code = np.where(lift > 0.0, np.clip(code, 1.0, LIFT_STEPS), 0.0)
+    high = np.floor(code / BESIDE_BITS)
+    numbers = np.stack([high, code - high * BESIDE_BITS], axis=1)
+    snapped = np.floor(octahedral(normal) * BESIDE_GRID + 0.5)
+    return ((snapped + numbers / BESIDE_BITS) / BESIDE_GRID).astype(np.float32)
+
+
 def farthest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """(count,) numbers of points (N, D), each the farthest from those before, and (N,) the nearest centre of each, by
     its place among them. In the precision of `points`; Eldar et al. 1997."""

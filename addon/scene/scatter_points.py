@@ -36,7 +36,7 @@ from ..materials.translucency import maps_of
 from ..materials.working_space import current
 from ..snapshot.scene import Instance, Snapshot
 from .on_gpu import SceneOnGpu
-from .pieces import octahedral
+from .pieces import octahedral, octahedral_with_lift
 from .scatter_surface import ROW, RUNS, Surface, Voxels
 
 FEWEST, FEWEST_WALKED = 256, 1024  # cells of an object
@@ -170,7 +170,7 @@ class ScatterPoints:
         self._instances = None
         if not blocks:
             return
-        place, normal, face, area, curve, entry = (np.concatenate(parts) for parts in zip(*blocks))
+        place, normal, face, lift, area, curve, entry = (np.concatenate(parts) for parts in zip(*blocks))
         rows = len(place) // ROW
         by_row = place.reshape(rows, ROW * RUNS, 3)
         low, high = by_row.min(axis=1), by_row.max(axis=1)
@@ -181,7 +181,9 @@ class ScatterPoints:
         self.curves = _image(np.repeat(curve[:, None], 4, axis=1))
         for run in range(RUNS):
             self._positions.append(_image(np.concatenate([place[:, run], one], axis=1)))
-            packed = np.concatenate([octahedral(normal[:, run]), octahedral(face[:, run])], axis=1)
+            packed = np.concatenate(
+                [octahedral(normal[:, run]), octahedral_with_lift(face[:, run], lift[:, run])], axis=1
+            )
             self._normals.append(_image(packed))
             self._entries.append(_image(entry[:, run]))
             cells = np.concatenate([place[:, run], area[:, None]], axis=1).reshape(rows, ROW, 4)

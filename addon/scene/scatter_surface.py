@@ -9,6 +9,7 @@ import numpy as np
 from ..kernels.morton import morton_codes
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance, Mesh
+from .envelope import NOISE, normal_envelope
 from .mesh_parts import parts_of
 from .pieces import farthest
 
@@ -26,7 +27,8 @@ AXES = np.concatenate([[axis, -axis] for axis in np.eye(3)])
 class Surface:
     """Triangles of an instance that scatter: corners and corner normals (T, 3, 3), areas (T,), texture coordinates
     (T, 3, 2), numbers of materials (T,), how far light spreads and the mean thickness of what is closed, m, the
-    share of the points it asks for that it has, and whether it is the other side of a sheet."""
+    share of the points it asks for that it has, whether it is the other side of a sheet, and whether its light begins
+    where smooth shading says that it runs (the object's Shadow Terminator, Geometry Offset)."""
 
     corners: np.ndarray
     normals: np.ndarray
@@ -37,6 +39,7 @@ class Surface:
     thickness: float
     share: float = 1.0
     behind: bool = False
+    lifted: bool = True
 
     @property
     def area(self) -> float:
@@ -84,6 +87,7 @@ class Surface:
         front = cls(
             all_corners[kept], normals[kept], areas[kept], uv, material[kept],
             float(positive.min()) if len(positive) else 0.0, thickness if thickness > 0.0 else np.inf,
+            lifted=instance.terminator > 0.0,
         )  # fmt: skip
         open_parts = ~closed[kept]
         if not open_parts.any():
@@ -94,11 +98,12 @@ class Surface:
         return [front, replace(front, normals=turned, share=share, behind=True)]
 
     def cells(self, count: int) -> tuple[np.ndarray, ...]:
-        """Points (count, RUNS, 3), shading normals and triangles' normals of the same shape, areas and radii of
+        """Points (count, RUNS, 3), shading normals and triangles' normals of the same shape, how high above their
+        triangles smooth shading puts them, m (count, RUNS), areas and radii of
         curvature (count,), by how much normals differ in a cell for how much places do; numbers of
         triangles (count, RUNS), texture coordinates (count, RUNS, 2), and the cloud: places, triangles' normals and the
         cell of each."""
-        place, normal, face, triangle, uv = self._cloud(count * RUNS)
+        place, normal, face, lift, triangle, uv = self._cloud(count * RUNS)
         size = np.sqrt(self.area / count)
         centre, owner = farthest(np.concatenate([place, TURN / 2 * size * face], axis=1).astype(np.float32), count)
         sums = np.bincount(owner, minlength=count)
@@ -113,12 +118,12 @@ class Surface:
         areas = sums * (self.area / len(place))
         cell = np.argsort(along, kind="stable")[owner]
         radius = np.sqrt(_spreads(place, cell, count) / np.maximum(_spreads(face, cell, count), 1e-9))
-        found = place[member], normal[member], face[member], areas, radius
+        found = place[member], normal[member], face[member], lift[member], areas, radius
         return *found, triangle[member], uv[member], (place, face, cell)
 
     def _cloud(self, count: int) -> tuple[np.ndarray, ...]:
-        """Evenly spread points, with shading normals, those of their triangles, the triangles' numbers and texture
-        coordinates."""
+        """Evenly spread points, with shading normals, those of their triangles, lifts, the triangles' numbers and
+        texture coordinates."""
         edges = np.concatenate([[0.0], np.cumsum(self.areas)])
         u, v, w = (bits(np.arange(count), dimension) / 2.0**32 for dimension in range(3))
         triangle = np.clip(np.searchsorted(edges, u * edges[-1], side="right") - 1, 0, len(self.areas) - 1)
@@ -129,7 +134,25 @@ class Surface:
         face = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         face *= np.where((face * normal).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
         normal = np.where((normal * normal).sum(axis=1, keepdims=True) > 0.5, normal, face)
-        return (share * corners).sum(axis=1), normal, face, triangle, (share * self.uv[triangle]).sum(axis=1)
+        place = (share * corners).sum(axis=1)
+        lift = self._lifts(triangle, share, place) if self.lifted else np.zeros(count)
+        return place, normal, face, lift, triangle, (share * self.uv[triangle]).sum(axis=1)
+
+    def _lifts(self, triangle: np.ndarray, share: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """How high above their triangles the smooth surface is meant to run at places with these shares of corners:
+        smooth_lift of shaders/surface/point.glsl."""
+        count = len(self.corners)
+        corners = self.corners - self.corners[:, :1]
+        normals = _unit(self.normals.reshape(-1, 3)).reshape(-1, 3, 3)
+        flat = np.arange(3 * count).reshape(-1, 3)
+        above = normal_envelope(corners.reshape(-1, 3), normals.reshape(-1, 3), flat)[:, 0].reshape(-1, 3, 1)
+        mean = (share * normals[triangle]).sum(axis=1)
+        reach = np.linalg.norm(mean, axis=1)
+        own = (share[..., 0] * (corners * normals).sum(axis=2)[triangle]).sum(axis=1)
+        height = own - ((place - self.corners[triangle, 0]) * mean).sum(axis=1)
+        lift = np.maximum(height, (share * above[triangle]).sum(axis=1)[:, 0]) / np.maximum(reach, 1e-30)
+        size = np.abs(corners).max(axis=(1, 2))[triangle]
+        return np.where((reach > 0.0) & (lift > NOISE * size), lift, 0.0)
 
 
 @dataclass(frozen=True)

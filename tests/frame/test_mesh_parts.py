@@ -25,7 +25,7 @@ def mesh(positions, triangles):
 
 
 def sides(made):
-    instance = SimpleNamespace(matrix=np.eye(4), materials=(0,))
+    instance = SimpleNamespace(matrix=np.eye(4), materials=(0,), terminator=0.1)
     return Surface.sides(instance, made, (1.0,), np.zeros(3))
 
 

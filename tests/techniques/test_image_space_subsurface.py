@@ -74,6 +74,15 @@ def test_a_half_lit_plane_has_the_profile_of_an_edge(stage):
     assert found[:, 0] + found[::-1, 0] == pytest.approx(1.0, abs=0.015)
 
 
+def test_light_that_comes_in_along_a_ball_does_not_pass_the_wall_before_it(stage):
+    """In the shadow of a board the ball is black: so are its points where light would come in along the surface."""
+    sphere(stage, scattering(stage, "RANDOM_WALK_SKIN", 2.0))
+    stage.blocker((-1.2, -1.2), (1.2, 1.2), 1.1)
+    stage.light("SUN", energy=100.0, angle=0.0)
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
+    assert shown(stage.render(1, size=(12, 12))).max() == 0.0
+
+
 @pytest.mark.parametrize("turn", [0.0, np.pi])
 def test_light_enters_beside_the_picture_too(stage, turn):
     """The camera sees the shadow up to its edge; what is lit, or dark, lies outside."""

@@ -1,11 +1,14 @@
 """Profiles of subsurface scattering: closed forms, the specification's table, and the shader's against numpy's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.gfx import context, images, passes
 from addon.kernels import diffusion
 from addon.kernels.diffusion import Medium
+from addon.scene.pieces import octahedral_with_lift
 from addon.scene.scatter_surface import Surface
 
 trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
@@ -160,3 +163,52 @@ def test_cells_of_a_box_share_no_edge():
     )
     face = box.cells(256)[2]
     assert np.einsum("crx,cx->cr", face, face[:, 0]).min() > 0.99
+
+
+LIFTED = passes.fullscreen_program(
+    "lift probe", "gbuffer/probe.frag.glsl",
+    textures=(("RGBA32F", "stored"),),
+    outputs=(("VEC4", "out_read"),),
+    snippets=(("gbuffer/probe.frag.glsl", """
+#include "lib/gbuffer.glsl"
+void main()
+{
+  vec4 texel = stored_fetch(ivec2(gl_FragCoord.xy));
+  out_read = vec4(octahedral_decode(texel.xy), lift_decode(texel.xy));
+}
+"""),),
+)  # fmt: skip
+
+
+def test_shaders_read_the_lift_that_is_stored_beside_a_direction(registered):
+    """The last bits of most directions, left as they are, mean some length: light would begin that far off."""
+    context.ensure()
+    k = np.arange(64)
+    height = 1.0 - 2.0 * (k + 0.5) / 64
+    away = np.sqrt(1.0 - height**2)
+    unit = np.stack([away * np.cos(2.4 * k), away * np.sin(2.4 * k), height], axis=1)
+    lift = np.where(k % 4 == 0, 0.0, 10.0 ** (k % 7 - 4.0))
+    stored = np.zeros((1, 64, 4), np.float32)
+    stored[0, :, :2] = octahedral_with_lift(unit, lift)
+    with images.borrowed(64, 1, "RGBA32F") as target:
+        passes.fullscreen(LIFTED, target, textures={"stored": images.upload(stored)})
+        found = images.read(target.colors[0])[0]
+    assert found[:, :3] == pytest.approx(unit, abs=5e-5)
+    assert (found[lift == 0.0, 3] == 0.0).all()
+    assert found[:, 3] == pytest.approx(lift, rel=2e-3)
+
+
+def test_points_of_a_smooth_ball_are_lifted_as_its_pixels_are():
+    """Normals N = V / R of corners: the mean of V . N less the point's own is (R^2 - P^2) / |P|. Of a back side, which
+    curves the other way, no more than its envelope says; none without the object's Geometry Offset."""
+    radius = 2.0
+    corner = radius * np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+    triangles = np.stack([corner * [x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)])
+    area = np.full(8, np.sqrt(3.0) / 2 * radius**2)
+    ball = Surface(triangles, triangles / radius, area, np.zeros((8, 3, 2)), np.zeros(8, int), 1.0, 1.0)
+    place, normal, _, lift, *_ = ball.cells(64)
+    reach = np.linalg.norm(place, axis=2)
+    assert normal == pytest.approx(place / reach[..., None], abs=1e-6)
+    assert lift == pytest.approx((radius**2 - reach**2) / reach, abs=1e-9)
+    assert (replace(ball, normals=-ball.normals).cells(64)[3] < lift + 1e-9).all()
+    assert not replace(ball, lifted=False).cells(64)[3].any()
