@@ -471,6 +471,24 @@ def page_through(rows: list[tuple[str, ...]], size: tuple[int, int], reference: 
     ])  # fmt: skip
 
 
+EQUAL = (*(("CANDELA", n) for n in (1, 4, 16)), *((DENOISED, n) for n in (1, 4, 16, 64)))  # entrants of `--equal`
+EQUAL_HEAD = ("scene", "method", "Candela", "relMSE", "processor s", "Cycles denoised that errs no more", "processor s")
+
+
+def equal(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """What denoised Cycles takes to err no more than Candela, for each row of Candela's: its fewest samples that do."""
+    found = []
+    for scene, method, label, error, _, seconds, _ in rows:
+        if not label.startswith("Candela"):
+            continue
+        others = [row for row in rows if row[:2] == (scene, method) and row[2].startswith(LABELS[DENOISED])]
+        enough = [(float(row[5]), row[2].split()[-1], row[3]) for row in others if float(row[3]) <= float(error)]
+        least = min(enough) if enough else None
+        cycles = (f"{least[1]} samples, {least[2]}", f"{least[0]:.2f}") if least else ("none of these", "–")
+        found.append((scene, method, label.split()[-1], error, seconds, *cycles))
+    return found
+
+
 COMMAND = "python -m bench subsurface --page docs/subsurface.md"
 COMMAND_OPAQUE = "python -m bench subsurface --opaque --page docs/subsurface.md"
 FEW = (("CANDELA", 1), ("CANDELA", 16), (DENOISED, 16))  # entrants of light that comes through
@@ -481,6 +499,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="+", choices=every, metavar="NAME", help="default all of either table")
     parser.add_argument("--opaque", action="store_true", help="scenes in which little light comes through, and EEVEE")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS, metavar="METHOD")
+    parser.add_argument("--equal", action="store_true", help="processor seconds for equal error beside denoised Cycles")
     parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out, which compiles for minutes")
     parser.add_argument("--size", type=size_of, default=(96, 96), metavar="WxH", help="default 96x96")
     parser.add_argument("--reference", type=int, default=512, metavar="N", help="of each of two (default 512)")
@@ -495,13 +514,15 @@ def command(options: argparse.Namespace) -> int:
     rows: list[tuple[str, ...]] = []
     entrants = tuple(one for one in ENTRANTS if not (options.no_eevee and one[0] == "BLENDER_EEVEE"))
     through = not options.opaque
-    entrants = FEW if through else entrants
+    entrants = EQUAL if options.equal else FEW if through else entrants
     for name in options.scenes or (THROUGH if through else SCENES):
         for method in options.methods:
             added = lines(name, method, options.size, options.reference, options.pictures, entrants)
             print(table([HEAD, *added]), flush=True)
             rows += added
-            if options.page:
+            if options.equal:
+                print(table([EQUAL_HEAD, *equal(added)]), flush=True)
+            elif options.page:
                 text = (page_through if through else page)(rows, options.size, options.reference)
                 markdown.put_between(options.page, COMMAND if through else COMMAND_OPAQUE, text)
     return 0

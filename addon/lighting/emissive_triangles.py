@@ -170,6 +170,10 @@ class EmissiveTriangles:
             row[lights.LIGHT.at.first_view] = lights.passing_bits(self.passing[k])
         return row
 
+    def passing_at(self, x: float) -> frozenset[int]:
+        """Groups of blockers that let the light pass of the point that is drawn by this number first."""
+        return self.passing[self._at(x)]
+
     def stretched(self, x: float, y: float) -> np.ndarray:
         """Three numbers for `draw` out of two: where `x` lies within a triangle's share of the power is the third."""
         k = self._at(x)

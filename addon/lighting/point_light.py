@@ -7,7 +7,7 @@ has several, so that a picture of one sample is smooth.
 | cost | per sample |
 |---|---|
 | rays | a point: one for each point of a light source |
-| passes | 1 over the points for each 64 points of light sources; lamps that other objects block are asked apart |
+| passes | 1 over the points for each 64 points of light sources; lights that other objects block are asked apart |
 """
 
 from __future__ import annotations
@@ -71,10 +71,9 @@ class PointLight:
         geometry's image), for lights that leave out objects. Returns the numbers of passes and of rays a point."""
         number = frame.sample if number is None else number
         by_blockers: dict[frozenset[int], list[np.ndarray]] = {}  # that let light pass
-        for passing, row in self._lamps(frame, number):
+        for passing, row in (*self._lamps(frame, number), *self._emitted(frame, number)):
             by_blockers.setdefault(passing, []).append(row)
-        others = [*self._world(frame, number), *self._emitted(frame, number)]
-        by_blockers[frozenset()] = by_blockers.get(frozenset(), []) + others
+        by_blockers[frozenset()] = by_blockers.get(frozenset(), []) + list(self._world(frame, number))
         rows = [row for some in by_blockers.values() for row in some]
         drawn = 0
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
@@ -141,14 +140,15 @@ class PointLight:
         for direction, radiance, density in zip(*frame.environment.draw(*drawn.T)):
             yield lights.direction_row(direction, radiance / density, density, flags, 0, 1, each)
 
-    def _emitted(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
+    def _emitted(self, frame: Frame, sample_number: int) -> Iterator[tuple[frozenset[int], np.ndarray]]:
         if self._emissive is None:
             return
         each = self._points(frame, self._others)
         for number in range(sample_number * each, (sample_number + 1) * each):
             numbers = frame.random_volume(f"{self._use}/emissive", number)
             samples = self._sharpness * frame.settings.samples
-            yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=samples)
+            row = self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=samples)
+            yield self._emissive.passing_at(numbers[0]), row
 
     def release(self) -> None:
         self._sources.release()

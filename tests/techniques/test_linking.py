@@ -222,18 +222,24 @@ def test_a_lamp_that_leaves_out_wax_lights_no_side_of_it(stage):
     assert left_out == pytest.approx(alone, rel=0.02, abs=1e-4)
 
 
-def test_what_a_lamp_does_not_take_as_a_blocker_leaves_its_light_to_the_far_sides_of_wax(stage):
-    """Points of the mesh that the camera does not see are lit past a board whose shadow the lamp does not throw."""
+@pytest.mark.parametrize("by_mesh", [False, True])
+def test_what_a_light_does_not_take_as_a_blocker_leaves_its_light_to_the_far_sides_of_wax(stage, by_mesh):
+    """Points of the mesh that the camera does not see are lit past a board whose shadow the lamp, or the mesh that
+    shines, does not throw."""
     wax = waxen(stage)
     body = box(stage, 0.0)
     body.data.materials[0] = wax
-    behind = stage.light("POINT", (0, 3, 0.5), energy=500)
+    if by_mesh:
+        behind = box(stage, 0.0)
+        behind.location.y, behind.data.materials[0] = 4.0, stage.material("ShaderNodeEmission", Strength=30.0)
+    else:
+        behind = stage.light("POINT", (0, 3, 0.5), energy=500)
     stage.camera((0, -4, 0.5), (np.pi / 2, 0, 0), angle=0.4)
     alone = stage.render(1, (24, 24))["combined"][..., :3]
     board = box(stage, 0.0)
     board.location.y = 2.0
     shadowed = stage.render(1, (24, 24))["combined"][..., :3]
-    behind.light_linking.blocker_collection = collection([body])
+    behind.light_linking.blocker_collection = collection([body, behind] if by_mesh else [body])
     passed = stage.render(1, (24, 24))["combined"][..., :3]
     bpy.data.collections.remove(behind.light_linking.blocker_collection)
     assert shadowed.mean() < 0.5 * alone.mean()
