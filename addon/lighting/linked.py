@@ -11,8 +11,9 @@ without links compile and draw nothing of this.
 | memory | 7 images of 16 bytes a pixel while it draws, 1 of 4 that stays |
 
 Light that rays find at other surfaces (shaders/indirect/path.glsl) follows links, too: triangles of the hierarchy know
-the groups of their object. Not followed: light of other kinds of bounces, through glass, or in a volume; emissive
-meshes in mirrors.
+the groups of their object, and what mirrors and glass show has its receivers' groups drawn beside it. Lamps that light
+no volume's group shine into none (snapshot/linking.py). Not followed: light of other kinds of bounces, photons, shadow
+links in volumes, mirrors and glass; emissive meshes in mirrors.
 """
 
 from __future__ import annotations
@@ -33,13 +34,20 @@ from ..surfaces.draw import SURFACES, draw_indices
 from . import repeated_light
 
 GROUPS = "surface.group"
-FIND_GROUPS = passes.fullscreen_program(
-    "groups of receivers",
-    "light/groups.frag.glsl",
-    textures=(("RGBA32F", "surface_object"), ("RGBA32F", "instances")),
-    defines=(("VISIBILITY_FLAG", "FLAG_CAMERA"),),
-    outputs=(("FLOAT", "out_group"),),
-)
+
+
+def _groups_program(number: str) -> Program:
+    """`number`: component in which instances' numbers stand."""
+    return passes.fullscreen_program(
+        "groups of receivers",
+        "light/groups.frag.glsl",
+        textures=(("RGBA32F", "surface_object"), ("RGBA32F", "instances")),
+        defines=(("VISIBILITY_FLAG", "FLAG_CAMERA"), ("NUMBER", number)),
+        outputs=(("FLOAT", "out_group"),),
+    )
+
+
+FIND_GROUPS, FIND_GROUPS_AT_HITS = _groups_program("z"), _groups_program("x")
 
 
 LINKS = Interface("links", "light/links.glsl", (("R32F", "receiver_groups"),), lambda frame: None)  # by `linked`
@@ -61,9 +69,27 @@ def linked(
     return answered(program, (LINKS,))
 
 
-def find_groups(frame: Frame, numbers: images.Image, groups: images.Target) -> None:
-    """From the numbers of instances (z: rows of the geometry's image) their groups of receivers."""
-    passes.fullscreen(FIND_GROUPS, groups, textures={"surface_object": numbers, "instances": frame.geometry.instances})
+def linked_where_hit(
+    frame: Frame, technique: Technique, program: Program, rows: list[np.ndarray], triangles: images.Image,
+    textures: dict[str, images.Image],
+) -> Program:  # fmt: skip
+    """The same pass for what these lights leave out of what rays have met (`triangles`: records of it,
+    surfaces/hits.py). The image of groups is added to `textures`."""
+    if not has_links(rows):
+        return program
+    name = f"{GROUPS}_at_hits"
+    if name not in frame.images:
+        frame.images[name] = images.pool.take(*frame.size, "R32F")
+    find_groups(frame, triangles, frame.target(name), at_hits=True)
+    frame.count(technique, "passes")
+    textures["receiver_groups"] = frame.images[name]
+    return answered(program, (LINKS,))
+
+
+def find_groups(frame: Frame, numbers: images.Image, groups: images.Target, at_hits: bool = False) -> None:
+    """From the numbers of instances (z, `at_hits` x: rows of the geometry's image) their groups of receivers."""
+    program = FIND_GROUPS_AT_HITS if at_hits else FIND_GROUPS
+    passes.fullscreen(program, groups, textures={"surface_object": numbers, "instances": frame.geometry.instances})
 
 
 def linked_at_hits(frame: Frame, program: Program) -> Program:

@@ -22,7 +22,7 @@ from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
 from .instances import Place, Source, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
-from .linking import LinkTable, read_links
+from .linking import LinkTable, read_links, without_volumes
 from .meshes import Wanted, build_mesh, read_mesh
 from .motion import with_motion
 from .object_attributes import of_places
@@ -109,12 +109,16 @@ def take(
     notes += mesh_notes
     lights = _lights(*_at_a_place(light_places, notes), shading, links)
     override = layer.material_override
+    volume_facts = [place.source.facts for place in (*domains, *volume_places)]
     volumes = read_volumes(
         *_at_a_place(volume_places, notes), shading, override, cache, notes, depsgraph.mode == "RENDER"
     )
     volumes += read_smoke(domains, domain_places, shading, override, cache, notes)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
+    if links.unlit:
+        lights, linked_notes = without_volumes(lights, _volume_groups(links, shading, world, instances, volume_facts))
+        notes += linked_notes
     film = _film(scene, depsgraph.view_layer_eval, width, height, border)
     if view.panorama is not None and any(aov.kind == "VECTOR" for aov in film.aovs):
         film = replace(film, aovs=tuple(aov for aov in film.aovs if aov.kind not in ("VECTOR", "HIT")))
@@ -171,6 +175,14 @@ def _links(places: list[Place], light_places: list[Place]) -> LinkTable:
     owners = [one.owner for one in sources if one.facts.linked]
     owners += [one.parent for one in sources if one.facts.linked and one.parent is not None]
     return read_links(owners)
+
+
+def _volume_groups(links: LinkTable, shading: ShadingTable, world: World, instances, of_grids: list) -> set[int]:
+    """Groups of receivers that volumes belong to, those of grids by the facts of their objects."""
+    filled = {k for k, one in enumerate(shading.materials) if one.graph.volume is not None}
+    groups = {one.links.receiver for one in instances if not filled.isdisjoint(one.materials)}
+    groups |= {links.of(facts.uid, facts.parent_uid).receiver for facts in of_grids}
+    return groups | ({links.others[0]} if world.medium is not None else set())
 
 
 def _meshes(

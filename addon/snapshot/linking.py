@@ -11,9 +11,9 @@ groups of receivers those beyond are lit by everything, with a note.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from .scene import NO_LINKS, Links, Note
+from .scene import NO_LINKS, Light, Links, Note
 
 MOST_GROUPS = 12  # of receivers: a bit each beside a light's flags, see sources/lights.py
 
@@ -76,6 +76,21 @@ def read_links(owners: Iterable) -> LinkTable:
     table.passing = {uid: frozenset(k for k, held in enumerate(found) if not held) for uid, found in sets.items()}
     table.others = other_receivers, other_blockers
     return table
+
+
+def without_volumes(lights: tuple[Light, ...], volumes: set[int]) -> tuple[tuple[Light, ...], list[Note]]:
+    """The same lamps, of which those shine into no volume that light none of the groups of receivers `volumes`; and a
+    note of each that lights some of them alone: it shines into all."""
+    found, notes = [], []
+    for light in lights:
+        dark = volumes.intersection(light.links.unlit)
+        if dark and dark != volumes:
+            text = "by light linking it lights some volumes and others not; it lights all of them."
+            notes.append(Note(f"Object '{light.name}'", text))
+        elif dark:
+            light = replace(light, visibility=replace(light.visibility, volume=False))
+        found.append(light)
+    return tuple(found), notes
 
 
 def _groups(collections: dict[int, _Named]) -> tuple[dict[int, int], int, dict[int, list[bool]]]:

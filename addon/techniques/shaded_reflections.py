@@ -31,14 +31,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 
+import numpy as np
+
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.shares import Turns
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting import caustic_maps
-from ..lighting.asked import asked
+from ..lighting import caustic_maps, linked
+from ..lighting.asked import lit_at_hits
 from ..lighting.caustic_casters import bright_world, meshes_answered
 from ..lighting.caustic_maps import CausticMaps
 from ..lighting.glass_interfaces import clear_roughness
@@ -227,6 +229,7 @@ class ShadedReflections(Technique, BothWays):
         self._onward = True  # whether rays may go on from what they meet
         self._guides: tuple[str, ...] = (SHOWN,)
         self._into: dict[str, images.Image] = {}  # what this bounce adds to, by name
+        self._rows: list[np.ndarray] = []  # lights of this sample
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
@@ -286,7 +289,7 @@ class ShadedReflections(Technique, BothWays):
         hits, transmission = frame.kept(Hits), refracts(frame)
         maps = frame.kept(CausticMaps)
         caustics = maps.ready(frame)
-        rows = self._sources.rows(frame, maps.lights if caustics else ())
+        self._rows = rows = self._sources.rows(frame, maps.lights if caustics else ())
         sources = self._sources.block(rows)
         mirrors = min(frame.settings.get(self, "bounces"), frame.settings.bounces)
         glass = next((t for t in frame.plan.techniques if "transmission" in t.fills), None)
@@ -441,7 +444,10 @@ class ShadedReflections(Technique, BothWays):
         if provided is not None:
             near = {name: provided.bindings["constants"][name] for name in near}
             textures = {name: provided.bindings["textures"][name] for name in textures}
-        program = asked(frame, received_program(self._sources.kinds, transmission, frame.materials.soft), textures)
+        program = received_program(self._sources.kinds, transmission, frame.materials.soft)
+        program = linked.linked_where_hit(
+            frame, self, lit_at_hits(frame, program, textures), self._rows, records.images["hit_triangle"], textures
+        )
         passes.fullscreen(
             program,
             self._target(transmission, ("indirect",), records.target.depth),

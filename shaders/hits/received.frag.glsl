@@ -3,6 +3,7 @@
 // that ray but for its share of the points.
 #define PART 128  // virtual lights that a hit looks at
 #include "indirect/near.glsl"
+#include "ask/links.glsl"
 #ifdef TRANSMISSION
 #include "lib/refraction.glsl"
 #endif
@@ -20,6 +21,7 @@ struct Receiver {
   bool within;     // glass mirrors, whose rays bend where light samples would pass straight
   bool followed;   // by a ray
   bool ended;      // would be, but for the number of bounces: shows nothing
+  int group;       // of receivers
   int mirrored;    // by so many surfaces on the way to the camera
   Lobe lobe;
 #ifdef TRANSMISSION
@@ -67,6 +69,9 @@ vec3 direct_light(Receiver r, uint salt)
   uint roll = salt;
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
+    if (light_leaves_out(light, r.group)) {
+      continue;
+    }
     vec3 direction;
     float density;
     vec3 arriving = light_sample(light, r.surface.position, direction, density);
@@ -158,6 +163,7 @@ void main()
   Receiver r;
   r.surface = SURFACE_READ(pixel);
   r.viewer = -ray_direction_fetch(pixel).xyz;
+  r.group = receiver_group(pixel);
   bool has_lobe = max_component(r.surface.glossy_weight) > 0.0;
 #ifdef TRANSMISSION
   r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;
