@@ -464,7 +464,11 @@ def lights_key(snapshot: Snapshot, but: tuple[str, ...] = ()) -> tuple:
 
 
 # What artists call images that programs read beside others (gfx/images.py, gfx/struct.py).
-BESIDE = {"lamp_maps": "what node trees of lamps do to their light", "surface_edit": "edits of reflections"}
+BESIDE = {
+    "lamp_maps": "what node trees of lamps do to their light",
+    "surface_edit": "edits of reflections",
+    "receiver_groups": "light linking of what mirrors and glass show",
+}
 
 
 def _without_room() -> Iterator[Note]:

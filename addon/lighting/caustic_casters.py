@@ -10,6 +10,8 @@ clear glass leaves as it is. Shadow rays of what is answered for take glass as o
 photons of it. All glass counts there, so a pane beside a lens is a caster, too. A scene in which all glass is flat
 panes and nothing else throws caustics is left to straight light, as is right for panes.
 
+Of lamps that light linking keeps from all casters nothing is bent or mirrored.
+
 Where all casters are closed convex meshes that only mirror, and no lamp stands among them, their light never
 converges (`spreads`): few photons have all of it.
 
@@ -124,6 +126,9 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     low, high = groups(*grown(boxes[:, 0], boxes[:, 1]))
     keys = frozenset(light.key for light in given).union(others)
     bent = frozenset(light.key for light in given if light.caustics) if by_flags else keys
+    # Light that a lamp does not send to any caster throws none, and glass still stops it.
+    receivers = {one.links.receiver for one in shown}
+    bent -= {light.key for light in given if receivers <= set(light.links.unlit)}
     spreads = not glass and _only_spread(snapshot, shown, mirrors, given, boxes)
     return Casters(frozenset(glass), mirrors, low, high, keys, bent, spreads)
 

@@ -69,21 +69,19 @@ def linked(
     return answered(program, (LINKS,))
 
 
-def linked_where_hit(
-    frame: Frame, technique: Technique, program: Program, rows: list[np.ndarray], triangles: images.Image,
-    textures: dict[str, images.Image],
-) -> Program:  # fmt: skip
-    """The same pass for what these lights leave out of what rays have met (`triangles`: records of it,
-    surfaces/hits.py). The image of groups is added to `textures`."""
+def groups_of_hits(
+    frame: Frame, technique: Technique, rows: list[np.ndarray], triangles: images.Image
+) -> dict[str, images.Image]:
+    """Groups of receivers of what rays have met (`triangles`: records of it, surfaces/hits.py), as an image beside what
+    a pass reads that lights it by these lights, (TEXELS, 4) each; none where no light leaves out receivers."""
     if not has_links(rows):
-        return program
+        return {}
     name = f"{GROUPS}_at_hits"
     if name not in frame.images:
         frame.images[name] = images.pool.take(*frame.size, "R32F")
     find_groups(frame, triangles, frame.target(name), at_hits=True)
     frame.count(technique, "passes")
-    textures["receiver_groups"] = frame.images[name]
-    return answered(program, (LINKS,))
+    return {"receiver_groups": frame.images[name]}
 
 
 def find_groups(frame: Frame, numbers: images.Image, groups: images.Target, at_hits: bool = False) -> None:

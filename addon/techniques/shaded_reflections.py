@@ -445,9 +445,8 @@ class ShadedReflections(Technique, BothWays):
             near = {name: provided.bindings["constants"][name] for name in near}
             textures = {name: provided.bindings["textures"][name] for name in textures}
         program = received_program(self._sources.kinds, transmission, frame.materials.soft)
-        program = linked.linked_where_hit(
-            frame, self, lit_at_hits(frame, program, textures), self._rows, records.images["hit_triangle"], textures
-        )
+        program, passed = lit_at_hits(frame, program, textures), records.images["hit_passed"]
+        passed.beside = linked.groups_of_hits(frame, self, self._rows, records.images["hit_triangle"])
         passes.fullscreen(
             program,
             self._target(transmission, ("indirect",), records.target.depth),
@@ -456,11 +455,12 @@ class ShadedReflections(Technique, BothWays):
             textures={
                 **closure_bindings(closures), **hierarchy.textures, **textures,
                 "energy_table": frame.materials.energy_table, "ray_direction": rays.colors[1],
-                "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"],
+                "met_path": rays.colors[2], "hit_passed": passed,
             },
             blocks={"film_view": frame.view_block, "sources": sources},
             constants={**near, **reach, "light_count": count, "offset_size": frame.offset_size, "repeats": repeats},
         )  # fmt: skip
+        passed.beside = {}
         frame.count(self, "passes")
 
     def _add_caustics(self, frame, maps, rays, records, closures, transmission) -> None:

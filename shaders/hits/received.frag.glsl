@@ -3,7 +3,6 @@
 // that ray but for its share of the points.
 #define PART 128  // virtual lights that a hit looks at
 #include "indirect/near.glsl"
-#include "ask/links.glsl"
 #ifdef TRANSMISSION
 #include "lib/refraction.glsl"
 #endif
@@ -69,9 +68,11 @@ vec3 direct_light(Receiver r, uint salt)
   uint roll = salt;
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
-    if (light_leaves_out(light, r.group)) {
+#ifdef HAS_RECEIVER_GROUPS
+    if (((light.unlit >> r.group) & 1) != 0) {
       continue;
     }
+#endif
     vec3 direction;
     float density;
     vec3 arriving = light_sample(light, r.surface.position, direction, density);
@@ -163,7 +164,9 @@ void main()
   Receiver r;
   r.surface = SURFACE_READ(pixel);
   r.viewer = -ray_direction_fetch(pixel).xyz;
-  r.group = receiver_group(pixel);
+#ifdef HAS_RECEIVER_GROUPS
+  r.group = int(receiver_groups_fetch(pixel).x + 0.5);
+#endif
   bool has_lobe = max_component(r.surface.glossy_weight) > 0.0;
 #ifdef TRANSMISSION
   r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;

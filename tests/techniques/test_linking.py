@@ -185,7 +185,7 @@ def test_more_groups_than_there_are_bits_are_named(room):
 
 def test_what_is_not_followed_is_said(room):
     lit_alone(room, room.lamp)
-    assert any("caustics follow none" in note.text for note in snapshot_of(room).notes)
+    assert any("follow none" in note.text for note in snapshot_of(room).notes)
 
 
 def test_an_instance_is_linked_as_its_parent_is_before_itself():
@@ -244,3 +244,37 @@ def test_what_a_light_does_not_take_as_a_blocker_leaves_its_light_to_the_far_sid
     bpy.data.collections.remove(behind.light_linking.blocker_collection)
     assert shadowed.mean() < 0.5 * alone.mean()
     assert passed.mean() == pytest.approx(alone.mean(), rel=0.02)
+
+
+def test_lamps_shine_into_volumes_that_they_light_alone(room):
+    """In Cycles a volume is the receiver. Of two volumes of which one is lit both are, with a sentence."""
+    mist = room.material("ShaderNodeVolumeScatter", Density=0.2)
+    tree = mist.node_tree
+    out = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    scatter = next(node for node in tree.nodes if node.type == "VOLUME_SCATTER")
+    for link in list(out.inputs["Surface"].links):
+        tree.links.remove(link)
+    tree.links.new(scatter.outputs[0], out.inputs["Volume"])
+    fog = box(room, 0.0)
+    fog.data.materials[0] = mist
+    bpy.data.objects.remove(next(one for one in room.scene.objects if one.type == "LIGHT" and one.data.type == "SUN"))
+    assert room.render(2, (16, 12))["volume_direct"].max() > 0.0
+    room.lamp.light_linking.receiver_collection = collection([fog], "EXCLUDE")
+    assert room.render(2, (16, 12))["volume_direct"].max() == 0.0
+    second = box(room, 1.0)
+    second.data.materials[0] = mist
+    assert room.render(2, (16, 12))["volume_direct"].max() > 0.0
+    assert any("some volumes" in note.text for note in room.ledger.notes)
+
+
+def test_mirrors_show_what_a_light_leaves_out_in_the_dark(room):
+    """Of a wall that no light reaches nothing is seen in gloss before it, which is too rough to throw caustics."""
+    for one in (*room.boxes, room.ground):
+        bpy.data.objects.remove(one)
+    bpy.data.objects.remove(next(one for one in room.scene.objects if one.type == "LIGHT" and one.data.type == "SUN"))
+    room.rectangle((-4, -4), (4, 4), material=room.principled(Metallic=1.0, Roughness=0.3))
+    wall = room.rectangle((-4, 0), (4, 4), material=room.diffuse(0.8), location=(0, 3, 0), turn=(np.pi / 2, 0, 0))
+    seen = [room.render(2, (16, 12), bounces=1)["glossy_indirect"].max()]
+    room.lamp.light_linking.receiver_collection = collection([wall], "EXCLUDE")
+    seen.append(room.render(2, (16, 12), bounces=1)["glossy_indirect"].max())
+    assert seen[0] > 0.01 and seen[1] == 0.0
