@@ -88,8 +88,10 @@ def gobo(room):
 # -------------------------------------------------------------------------------------------------------------- media
 
 
-def fog_box(room, material):
-    corners = [(x, y, z) for x in (-1.98, 1.98) for y in (-1.98, 1.98) for z in (0.01, 2.95)]
+def fog_box(room, material, within: float = 0.0):
+    """`within`: m inside of the other one's faces. Of two that coincide Cycles misses one medium."""
+    side = 1.98 - within
+    corners = [(x, y, z) for x in (-side, side) for y in (-side, side) for z in (0.01 + within, 2.95 - within)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return room.stage.mesh(corners, faces, material=material)
 
@@ -101,7 +103,7 @@ def fog_in_a_box(room):
 
 @feature
 def absorbing_box(room):
-    fog_box(room, room.volume("ShaderNodeVolumeAbsorption", Color=(0.3, 0.5, 0.9, 1), Density=0.4))
+    fog_box(room, room.volume("ShaderNodeVolumeAbsorption", Color=(0.3, 0.5, 0.9, 1), Density=0.4), within=0.01)
 
 
 @feature

@@ -11,6 +11,9 @@ drawn apart and must add up to the picture where Cycles' do; with 16 the picture
 
 Results go to out/pairs.json as they come; another run goes on with what is missing. `--triples N` draws N triples at
 random instead. `--page` writes docs/pairs.md and its picture.
+
+What Cycles cannot find is judged by light tracing where that is known (pair_truth.py; `--only A B --truth PYTHON` makes
+it), in the blocks that show no glass.
 """
 
 from __future__ import annotations
@@ -25,14 +28,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import ages, pair_features, pair_settings  # noqa: F401  (they name the features)
+from bench import ages, pair_features, pair_settings, pair_truth  # noqa: F401  (they name the features)
 from bench.cells import ROOT
 from bench.markdown import begin, put_between, table, write_whole
 from bench.pair_room import FEATURES, Room
 
 COMMAND = "python -m bench pairs"
 RESULTS, PAGE, PICTURE = ROOT / "out" / "pairs.json", ROOT / "docs" / "pairs.md", ROOT / "docs" / "images" / "pairs.png"
-SIZE, REFERENCE_SAMPLES, BLOCK = (48, 36), 128, 4
+SIZE, REFERENCE_SAMPLES, BLOCK = (48, 36), 64, 4
 BOUNDS = {1: (0.10, 0.10), 16: (0.03, 0.02)}  # by samples: how far the ratio of means is from 1, relMSE of blocks
 GREEN, AMBER, RED = "green", "amber", "red"
 APART = 0.01  # of the mean: how far the sum of passes may be from the picture beyond what it is for Cycles
@@ -49,6 +52,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=int, nargs="+", default=sorted(BOUNDS), choices=sorted(BOUNDS))
     parser.add_argument("--again", action="store_true", help="render what is known, too")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="write pictures: Candela's, then Cycles'")
+    parser.add_argument("--truth", metavar="PYTHON", help="trace light with Mitsuba in this interpreter, and keep that")
+    parser.add_argument("--photons", type=int, default=60_000_000, help="for --truth")
     parser.add_argument("--page", action="store_true", help=f"write {PAGE.name} from what is known")
 
 
@@ -60,6 +65,10 @@ def command(options: argparse.Namespace) -> int:
     made = [one for one in chosen(options) if options.again or any(str(n) not in known.get(key(one), {})
                                                                    for n in options.samples)]  # fmt: skip
     stage = _stage()
+    if options.truth:
+        made = chosen(options)
+        for names in made:
+            pair_truth.make(_room(stage, names), key(names), SIZE, options.truth, options.photons)
     for number, names in enumerate(made):
         found = measure(stage, names, options.samples, options.keep)
         known = read()  # another process may have written
@@ -79,6 +88,13 @@ def _stage():
     from tests.techniques.conftest import Stage
 
     return Stage()
+
+
+def _room(stage, names: tuple[str, ...]) -> Room:
+    room = Room(stage)
+    for name in names:
+        FEATURES[name](room)
+    return room
 
 
 def key(names: tuple[str, ...]) -> str:
@@ -114,15 +130,17 @@ def measure(stage, names: tuple[str, ...], samples: list[int], keep: Path | None
 
     found: dict[str, dict] = {}
     try:
-        room = Room(stage)
-        for name in names:
-            FEATURES[name](room)
+        room = _room(stage, names)
         truth = reference(room.scene, REFERENCE_SAMPLES, size=SIZE)
     except Exception:
         traceback.print_exc()
         return {str(n): {"failed": "the scene or its reference: " + traceback.format_exc(limit=1)} for n in samples}
     commit = ages.git("rev-parse", "--short=10", "HEAD") or ""
     pixels, half = truth.images["combined"][..., :3], truth.half["combined"][..., :3]
+    traced = pair_truth.known().get(key(names))
+    if traced is not None:
+        glass = truth.images["transmission_color"][..., :3]
+        pixels, half = _clear(traced.mean(axis=0), glass), _clear((traced[0] - traced[1]) / 2, glass)
     for n in samples:
         started = resource.getrusage(resource.RUSAGE_SELF)
         extra = combined_alone(room.layer) if n > 1 else []
@@ -133,6 +151,7 @@ def measure(stage, names: tuple[str, ...], samples: list[int], keep: Path | None
             continue
         spent = resource.getrusage(resource.RUSAGE_SELF)
         own = drawn.images["combined"][..., :3]
+        own = own if traced is None else _clear(own, glass)
         wrong = [said for check in room.checks if (said := of_check(check, drawn.layers))]
         if n == 1 and (off := sum_of_passes(drawn.images)) > sum_of_passes(truth.images) + APART:
             wrong.append(f"the light passes differ from the picture by {off:.3f} of its mean")
@@ -184,6 +203,13 @@ def judged(own: np.ndarray, truth: np.ndarray, half: np.ndarray, samples: int) -
             abs(float(own.mean()) / mean - 1.0) <= most + abs(float(half.mean())) / mean and error <= relmse + 2 * floor
         ),
     }  # fmt: skip
+
+
+def _clear(image: np.ndarray, glass: np.ndarray) -> np.ndarray:
+    """The blocks of a picture that show no glass, side by side: (BLOCK, BLOCK N, 3)."""
+    rows, columns = (extent // BLOCK for extent in image.shape[:2])
+    parts = image[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK, 3).swapaxes(1, 2)
+    return np.concatenate(parts[~_blocks(glass).any(axis=-1)], axis=1)
 
 
 def _of_blocks(difference: np.ndarray, truth: np.ndarray) -> float:
