@@ -79,6 +79,8 @@ def _where_systems_meet(plan: Plan, settings: Settings) -> Iterator[Note]:
     if air is not None and min(settings.bounces, settings.get(air, "bounces")) > 0:
         text = "mirrors and glass show light that volumes scatter once; what they scatter more often is missing there."
         yield Note("Volumes", text)
+    if plan.runs("volume_caustics"):
+        yield Note("Volumes", "mirrors and glass do not show the beams that glass and mirrors throw into volumes.")
     if plan.runs("grass"):
         yield Note("Grass", "mirrors, glass and bounced light meet the ground; the blades are missing there.")
 

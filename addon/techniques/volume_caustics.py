@@ -27,7 +27,7 @@ Belcour, Panteleev, Wright, "Improved Shader and Texture Level of Detail Using R
 
 Bias: the kernel's width; a beam seen nearly end-on is bounded (sine of 1/20). Rough glass and mirrors are taken as
 smooth up to SMOOTH and left out beyond. Materials count by their mean colour. The world and shining meshes throw no
-beams: their light passes glass straight. A beam behind glass is not seen.
+beams: their light passes glass straight. A beam behind glass or in a mirror is not seen (said in the ledger).
 """
 
 from __future__ import annotations

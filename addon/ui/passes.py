@@ -92,6 +92,7 @@ PASSES = tuple(
 )
 
 
+LEAST_COLOR = 1e-6  # of a surface: light is not divided by less
 CAMERA_AXES = "camera axes"  # (3, 3) beside the images that passes are made from: right, up, forward
 # What things change of the light on shadow catchers: 1 where nothing (film/catcher.py).
 CATCHER = RenderPass("cycles.use_pass_shadow_catcher", "Shadow Catcher", "RGB", "COLOR", "film.catcher")
@@ -256,8 +257,12 @@ def _ticked(layer: bpy.types.ViewLayer, switch: str) -> bool:
 
 
 def divide_by_color(light: np.ndarray, color: np.ndarray) -> np.ndarray:
-    """Light over colour per channel, as Cycles writes its passes: a channel without colour takes the mean of others."""
-    has = color != 0.0
+    """Light over colour per channel, as Cycles writes its passes: a channel without colour takes the mean of others.
+
+    So does one with next to none: at the far edge of a pixel's filter it would make thousands of a trace of light that
+    Denoise has brought there.
+    """
+    has = np.abs(color) > LEAST_COLOR
     quotient = np.where(has, light / np.where(has, color, 1.0), 0.0)
     count = has.sum(axis=-1, keepdims=True)
     mean = quotient.sum(axis=-1, keepdims=True) / np.maximum(count, 1)

@@ -1,6 +1,8 @@
 // One render pass as the viewport shows it: a mean over samples, of light over the surface's colour where `divided`, as
 // Cycles writes its passes; a single channel as grey, or three.
 
+#define LEAST_COLOR 1e-6  // light is not divided by less
+
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -11,14 +13,14 @@ void main()
     vec3 quotient = vec3(0.0);
     float count = 0.0;
     for (int k = 0; k < 3; k++) {
-      if (own[k] != 0.0) {
+      if (abs(own[k]) > LEAST_COLOR) {
         quotient[k] = shown[k] / own[k];
         count += 1.0;
       }
     }
     float mean = (quotient.r + quotient.g + quotient.b) / max(count, 1.0);
     for (int k = 0; k < 3; k++) {
-      if (own[k] == 0.0) {
+      if (!(abs(own[k]) > LEAST_COLOR)) {
         quotient[k] = mean;
       }
     }

@@ -58,10 +58,12 @@ def test_what_mirrors_lack_of_volumes_and_grass_is_said(monkeypatch, bounces, co
     for name in ("too_many", "too_many_copies"):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
     settings = SimpleNamespace(bounces=4, get=lambda technique, name: bounces)
-    air, mirrors, grass = (SimpleNamespace(name=name) for name in ("airlight", "shaded_reflections", "grass"))
+    names = "airlight", "shaded_reflections", "grass", "volume_caustics"
+    air, mirrors, grass, beams = (SimpleNamespace(name=name) for name in names)
     assert len(left_out.notes_of(Plan((air, mirrors), (), {}), SCENE, settings, ())) == count
     assert len(left_out.notes_of(Plan((air, mirrors, grass), (), {}), SCENE, settings, ())) == count + 1
-    assert left_out.notes_of(Plan((air, grass), (), {}), SCENE, settings, ()) == ()
+    assert len(left_out.notes_of(Plan((air, beams, mirrors), (), {}), SCENE, settings, ())) == count + 1
+    assert left_out.notes_of(Plan((air, grass, beams), (), {}), SCENE, settings, ()) == ()
 
 
 def test_grass_whose_patch_cannot_be_read_is_said(monkeypatch):

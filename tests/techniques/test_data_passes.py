@@ -132,7 +132,8 @@ def test_indices_change_no_picture_and_are_drawn_only_where_asked_for(asked):
 
 
 def test_light_over_colour_takes_the_mean_of_other_channels_where_there_is_none():
-    light = np.array([[[0.2, 0.6, 0.5], [0.3, 0.0, 0.0], [0.1, 0.2, 0.3]]], np.float32)
-    color = np.array([[[0.4, 0.2, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]], np.float32)
-    expected = [[[0.5, 3.0, 1.75], [0.0, 0.0, 0.0], [0.1, 0.2, 0.3]]]
+    traces = [1e-5, 1e-5, 1e-5], [1e-9, 2e-9, 0.0], [0.0, 0.0, 0.0]  # where a filter's edge meets glass
+    light = np.array([[[0.2, 0.6, 0.5], [0.3, 0.0, 0.0], [0.1, 0.2, 0.3], traces[0]]], np.float32)
+    color = np.array([[[0.4, 0.2, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], traces[1]]], np.float32)
+    expected = [[[0.5, 3.0, 1.75], [0.0, 0.0, 0.0], [0.1, 0.2, 0.3], traces[2]]]
     np.testing.assert_allclose(divide_by_color(light, color), expected, rtol=1e-6)
