@@ -86,7 +86,7 @@ class Room:
             return {"seconds": round(seconds, 2)}
         from addon.compare.metrics import compare_radiance
 
-        np.save(self._file(f"{engine}_{samples}.npy"), seen.astype(np.float32))
+        np.save(_picture(self.name, engine, samples), seen.astype(np.float32))
         error = compare_radiance("combined", seen, truth, half)
         return {
             "seconds": round(seconds, 2), "relmse": round(max(error.relmse - error.floor, 0.0), 5),
@@ -171,16 +171,21 @@ def sheet(known: dict[str, dict]) -> None:
     from addon.compare.metrics import display
     from addon.compare.png import png
 
+    kept = {name: [_picture(name, *shown) for shown in SHOWN] for name in known}
+    missing = [name for name, files in kept.items() if not all(file.exists() for file in files)]
+    if missing:
+        print(f"{SHEET.name} stays as it is: out/media holds no pictures of {', '.join(missing)}; measure --again.")
+        return
     rows = []
-    for name in known:
-        files = [KEPT / f"{name.replace(' ', '_')}_{engine}_{samples}.npy" for engine, samples in SHOWN]
-        if not all(file.exists() for file in files):
-            continue
+    for files in kept.values():
         pictures = [np.load(file) for file in files]
         exposure = float(-np.log2(max(np.percentile(pictures[-1], 98), 1e-6)))
         rows.append(np.concatenate([_middle(display(one, exposure)[::-1]) for one in pictures], axis=1))
-    if rows:
-        SHEET.write_bytes(png((np.concatenate(rows) * 255 + 0.5).astype(np.uint8)))
+    SHEET.write_bytes(png((np.concatenate(rows) * 255 + 0.5).astype(np.uint8)))
+
+
+def _picture(name: str, engine: str, samples: int) -> Path:
+    return KEPT / f"{name.replace(' ', '_')}_{engine}_{samples}.npy"
 
 
 def _middle(picture: np.ndarray) -> np.ndarray:
