@@ -34,7 +34,8 @@ def sides(frame: Frame, sources: Sequence, boxes: Sequence, side: int) -> np.nda
     brightest = max(carried[np.isfinite(carried)].max(initial=0.0), 1e-30)
     share = np.clip(np.minimum(carried / brightest, 1.0) ** (1.0 / 3.0), FAINTEST, 1.0)
     least = min(side, FEWEST_SIDE)
-    return np.clip(share * np.clip(shown, least, side), least, side).round().astype(int)
+    found = share * np.clip(shown, least, side)
+    return np.nan_to_num(np.clip(found, least, side), nan=side).round().astype(int)
 
 
 def _pixel(frame: Frame, centre: np.ndarray, across: np.ndarray) -> np.ndarray:

@@ -763,6 +763,7 @@ def test_grids_are_as_fine_as_pixels_can_show(away, width):
 def test_grids_have_photons_by_the_third_root_of_what_they_carry():
     found = grids(0.0, 1000, [80.0, 10.0, 0.001])[:, 0]
     assert tuple(found) == (160, 80, 64)
+    assert tuple(grids(0.0, 1000, [80.0, np.nan, np.inf])[:, 0]) == (160, 160, 160)
 
 
 def grids(away, width, watts, side=160):
@@ -813,6 +814,7 @@ def test_a_ball_that_mirrors_spreads_light_which_few_photons_have(stage, monkeyp
 
     few, least = light()
     monkeypatch.setattr(caustic_casters, "is_convex", lambda mesh: False)
+    monkeypatch.setattr(photon_grids, "PER_PIXEL", np.inf)  # the whole grid, however few pixels the ball fills
     many, most = light()
     assert least < most / 4
     assert few == pytest.approx(many, rel=0.03)
