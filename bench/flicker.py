@@ -32,7 +32,7 @@ PEERS = (
     *(("EEVEE", "BLENDER_EEVEE", samples, ()) for samples in (1, 16)),
 )
 FILM_MS, GAP = 200, 4  # a frame of the animation stands so long; pixels between engines
-SCENES = ("window_interior", "cornell_box", "sky_courtyard")
+SCENES = ("window_interior", "cornell_box", "sky_courtyard", "open_sky")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -61,16 +61,17 @@ def command(options: argparse.Namespace) -> int:
             print("  ".join(row), flush=True)
     print(table([HEAD, *rows]))
     if options.page:
-        kept = other_rows(PAGE.read_text(encoding="utf-8"), {row[0] for row in rows})
+        scenes = {row[0] for row in rows}
+        kept = [row for row in rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, HEAD) if row[0] not in scenes]
         put_between(PAGE, COMMAND, table([HEAD, *kept, *rows]))
     return 0
 
 
-def other_rows(page: str, scenes: set[str]) -> list[list[str]]:
-    """Rows of the page's table that are not of these scenes."""
-    written = page.partition(begin(COMMAND))[2].partition(END)[0]
+def rows_of(page: str, command: str, head: tuple[str, ...]) -> list[list[str]]:
+    """Rows of a page's table that a command wrote, without its head."""
+    written = page.partition(begin(command))[2].partition(END)[0]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in written.splitlines() if line[:2] == "| "]
-    return [row for row in cells if len(row) == len(HEAD) and row[0] not in {*scenes, HEAD[0]}]
+    return [row for row in cells if len(row) == len(head) and row[0] != head[0]]
 
 
 def measured(name: str, options: argparse.Namespace):
@@ -123,18 +124,30 @@ def write_film(path: Path, engines: list[list[np.ndarray]], exposure: float) -> 
 
 
 def opened(name: str) -> str:
-    """Open a sample file, a path, or a foggy room of media_scenes.py; what the page calls it."""
+    """Open a sample file, a path, `open_sky`, or a foggy room of media_scenes.py; what the page calls it."""
     import bpy
 
     from bench import media_scenes
 
-    if name in media_scenes.ROOMS:
+    built = {"open_sky": open_sky, **{room: parts[0] for room, parts in media_scenes.ROOMS.items()}}
+    if name in built:
         media_scenes.begin()
-        media_scenes.ROOMS[name][0]()
-        return name
+        built[name]()
+        return name.replace("_", " ") if name == "open_sky" else name
     path = Path(name) if name.endswith(".blend") else ROOT / "sample_blends" / f"{name}.blend"
     bpy.ops.wm.open_mainfile(filepath=str(path))
     return path.stem.replace("_", " ")
+
+
+def open_sky() -> None:
+    """A box and a ball on a floor that nothing but an even sky lights."""
+    from bench import beside_scenes as parts
+
+    parts.camera("Camera", (0, -6, 1.7), (parts.SIDE_VIEW[0] - 0.08, 0, 0))
+    parts.box((-8, -8, -0.2), (8, 8, 0), parts.diffuse(0.7, 0.7, 0.7))
+    parts.box((-1.6, 0, 0), (-0.4, 1, 1.6), parts.diffuse(0.7, 0.3, 0.2))
+    parts.ball(0.7, (1.1, 0.3, 0.7), parts.diffuse(0.3, 0.5, 0.7))
+    parts.world(0.6, 0.8, 1.0)
 
 
 def moved(scene, start, frames: int, size: tuple[int, int]):

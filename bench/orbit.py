@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.cells import ROOT
+from bench.flicker import rows_of
 from bench.markdown import put_between, table
 
 COMMAND = "python -m bench orbit"
@@ -40,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--every", type=int, default=4, help="of so many steps one is compared")
     parser.add_argument("--size", default="96x72", help="pixels of the draft")
     parser.add_argument("--truth", type=int, default=64, help="samples of a converged picture")
-    parser.add_argument("--page", action="store_true", help=f"write the table into docs/{PAGE.name}")
+    parser.add_argument("--page", action="store_true", help=f"write rows into docs/{PAGE.name}; others stay")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -54,7 +55,10 @@ def command(options: argparse.Namespace) -> int:
             print("  ".join(rows[-1]), flush=True)
     print(table(rows))
     if options.page:
-        put_between(PAGE, COMMAND, table(rows))
+        measured = {row[:2] for row in rows}
+        written = rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, HEAD)
+        kept = [row for row in written if tuple(row[:2]) not in measured]
+        put_between(PAGE, COMMAND, table([HEAD, *kept, *rows[1:]]))
     return 0
 
 

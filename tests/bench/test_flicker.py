@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.flicker import HEAD, figures, other_rows, write_film
+from bench.flicker import HEAD, figures, rows_of, write_film
 from bench.markdown import END, begin, table
 
 
@@ -26,10 +26,10 @@ def test_grain_of_single_pixels_is_a_fifth_after_the_blur():
     assert boiling / grain == pytest.approx(0.2, rel=0.05)
 
 
-def test_a_page_keeps_rows_of_scenes_that_were_not_measured():
+def test_rows_of_a_page_are_those_of_one_command():
     rows = [["hall", *"123456"], ["box", *"123456"]]
     page = f"a\n{begin('python -m bench flicker')}\n\nMade.\n\n{table([HEAD, *rows])}\n\n{END}\n| b |\n"
-    assert other_rows(page, {"box"}) == rows[:1]
+    assert rows_of(page, "python -m bench flicker", HEAD) == rows
 
 
 def test_a_film_goes_forth_and_back(tmp_path):
