@@ -151,12 +151,17 @@ def open_sky() -> None:
 
 
 def moved(scene, start, frames: int, size: tuple[int, int]):
-    """Numbers of frames; the camera goes sideways, so that what is 5 m away moves by STEP_PIXELS a frame."""
+    """Numbers of frames; the camera goes sideways, so that what is 5 m away moves by STEP_PIXELS a frame: to its right,
+    or to its left where a wall stands so near that it would end in it."""
     import bpy
     import mathutils
 
     data = scene.camera.data
     wide = data.ortho_scale if data.type == "ORTHO" else 2.0 * 5.0 * np.tan(data.angle / 2)
+    graph = bpy.context.evaluated_depsgraph_get()
+    origin, right = start.translation, start.to_3x3() @ mathutils.Vector((1.0, 0.0, 0.0))
+    far = 1.5 * frames * STEP_PIXELS * wide / size[0]
+    wide *= -1.0 if scene.ray_cast(graph, origin, right, distance=far)[0] else 1.0
     for number in range(frames):
         way = mathutils.Matrix.Translation((number * STEP_PIXELS * wide / size[0], 0.0, 0.0))
         scene.camera.matrix_world = start @ way
