@@ -84,9 +84,8 @@ def empty_scene():
 
 @pytest.fixture(autouse=True)
 def few_programs():
-    """Programs that tests compile without a picture would stay until one begins, and those that were drawn outside of
-    final renders until something is drawn there again: 4 MB each, and a process of them grew to 4 GB. Those of final
-    renders are not freed here: where their context is used again, Mesa (22.3) ends with a segmentation fault."""
+    """Programs that tests compile, or draw outside of final renders, would stay until a picture begins there: 4 MB
+    each, and a process of them grew to 4 GB. Those of final renders alone are left to them; see gfx/library.py."""
     yield
     library = sys.modules.get("addon.gfx.library")
     if library is not None:

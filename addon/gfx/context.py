@@ -38,6 +38,22 @@ def begin_picture() -> None:
         function()
 
 
+_leaves: list[Callable[[], None]] = []
+
+
+def on_leave(function: Callable[[], None]) -> Callable[[], None]:
+    """Register (as a decorator) what ends work in a GPU context that is not this process's only one."""
+    _leaves.append(function)
+    return function
+
+
+def leave() -> None:
+    """Work in the current GPU context ends, and may go on in another one."""
+    if available():
+        for function in _leaves:
+            function()
+
+
 class Turn:
     """A lock for whoever draws: who waits for it gets it before its last holder does again.
 

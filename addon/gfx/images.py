@@ -200,6 +200,7 @@ def lasting_context():
     try:
         yield
     finally:
+        context.leave()
         _thread.framebuffers = before
 
 
@@ -213,7 +214,8 @@ def _framebuffers() -> _Framebuffers:
 
 def lasts() -> bool:
     """Whether the current GPU context is one that goes on drawing after this picture, as far as that is known."""
-    return _framebuffers() is _lasting
+    own = getattr(_thread, "framebuffers", None)
+    return context.is_only_one() if own is None else own is _lasting
 
 
 @contextmanager
@@ -224,6 +226,7 @@ def passing_context():
     try:
         yield
     finally:
+        context.leave()
         _thread.framebuffers = before
 
 

@@ -148,7 +148,17 @@ class _Kept:
     """What the driver holds of a program, which outlives its Shader until it may be freed."""
 
     handle: object
-    lasts: bool = False  # drawn in a context that lasts
+    lasts: bool  # compiled or drawn in a context that lasts
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether nothing else holds the handle. Blender's batches hold the program that they drew last, until they
+        draw with another one, in whichever context that is."""
+        return sys.getrefcount(self.handle) <= _ALONE
+
+
+_nothing = _Kept(object(), True)
+_ALONE = sys.getrefcount(_nothing.handle)  # what Python counts where there is no other holder
 
 
 class Shader:
@@ -157,7 +167,7 @@ class Shader:
     def __init__(self, program: Program):
         self.program = program
         self.handle = _compile(program)
-        self.kept = _Kept(self.handle)
+        self.kept = _Kept(self.handle, images.lasts())
         weakref.finalize(self, _dropped.append, self.kept).atexit = False
         self.used = 0  # the last picture that asked for it
         self._fresh = True  # never bound: some drivers do most of their work at the first draw
@@ -249,9 +259,10 @@ MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120
 _shaders: dict[Program, Shader] = {}
 # Handles of shaders that are no more. Python may collect garbage in any thread, and Blender 4.5 ends with a
 # segmentation fault where a thread without a GPU context frees a program: they wait here for one that draws.
-# Those that a lasting context has drawn wait for such a one. Freed by another one they are put aside for it, and when
-# Mesa (22.3, where drivers do not share programs) gets to them there, it takes away what is bound without remembering:
-# a later draw ends with a segmentation fault.
+# Those that a lasting context has compiled or drawn wait for such a one, the others for one that passes, and all until
+# no batch holds them. Freed by another context they are put aside for their own (Mesa 22.3, where drivers do not share
+# programs: already linking makes something that is the current context's), and at its next flush that one takes away
+# what is bound without remembering: where the same program draws again, it ends with a segmentation fault.
 _dropped: list[_Kept] = []
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
 compile_seconds = 0.0  # what that took
@@ -307,27 +318,27 @@ def _free_old() -> None:
     _free_dropped()
 
 
-def _free_dropped(of_renders: bool = True) -> None:
-    """Free what waits for this context; `of_renders`: also what only final renders have drawn."""
+def _free_dropped() -> None:
+    """Free what waits for a context like this one and is held by nothing else."""
     if not _dropped:
         return
     gpu.shader.unbind()  # the last one that drew may be among them
     lasts = images.lasts()
     for _ in range(len(_dropped)):  # others may come to the end meanwhile
         one = _dropped.pop(0)
-        if (one.lasts and not lasts) or not (one.lasts or of_renders):
+        if one.lasts != lasts or not one.is_alone:
             _dropped.append(one)
 
 
 def free_lasting(most: int) -> None:
-    """Between pictures, in a context that lasts: where more than `most` programs that such a one has drawn are held or
-    wait to be freed, free them all. What final renders have drawn is left to them."""
+    """Between pictures, in a context that lasts: where more than `most` programs of such contexts are held or wait to
+    be freed, free them all. What final renders alone have compiled and drawn is left to them."""
     held = [program for program, shader in _shaders.items() if shader.kept.lasts]
     waiting = sum(one.lasts for one in _dropped)
     if len(held) + waiting > most and images.lasts() and context.available():
         for program in held:
             del _shaders[program]
-        _free_dropped(of_renders=False)
+        _free_dropped()
 
 
 @on_release

@@ -9,9 +9,9 @@ from functools import lru_cache
 import gpu
 import numpy as np
 
-from .context import on_release, overtakes_draws
+from .context import on_leave, on_release, overtakes_draws
 from .geometry import Batch, vertex_buffer
-from .images import Image, Target, finish
+from .images import Image, Target, borrowed, finish
 from .library import FULLSCREEN_VERTEX, MOST_TEXTURES, Program, Shader, get
 
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
@@ -60,6 +60,32 @@ def fullscreen(
         shader.bind(**bindings)
         (_triangle[0] if _triangle else _fullscreen_batch()).draw(shader.handle)
     gpu.shader.unbind()
+
+
+# Two, of which one has not been drawn last, whatever happened in between.
+_LAST = tuple(
+    fullscreen_program(
+        f"last drawn {k}", "generated/main", outputs=(("VEC4", "out_color"),),
+        snippets=(("generated/main", f"void main() {{ out_color = vec4({k}.0); }}"),),
+    )
+    for k in range(2)
+)  # fmt: skip
+_last: list[Shader] = []
+
+
+@on_leave
+def _let_go() -> None:
+    """Draw programs that are never freed. OpenGL's contexts hold the one that they drew last until they draw another:
+    freed meanwhile elsewhere it would end here, which is one more context than may free it (see library.py)."""
+    if gpu.platform.backend_type_get() != "OPENGL":
+        return
+    if not _last:
+        _last.extend(Shader(program) for program in _LAST)
+    with borrowed(1, 1, "RGBA32F") as target:
+        for shader in _last:
+            with _state(target):
+                shader.bind()
+                _fullscreen_batch().draw(shader.handle)
 
 
 @contextmanager
@@ -225,3 +251,4 @@ def _fullscreen_batch() -> gpu.types.GPUBatch:
 def _release() -> None:
     _triangle.clear()
     _quad.clear()
+    _last.clear()

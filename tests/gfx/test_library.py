@@ -138,16 +138,38 @@ def test_a_program_that_goes_in_another_thread_is_freed_in_one_that_draws(gpu_co
     """As when Python collects garbage there: Blender 4.5 ended with a segmentation fault."""
     context.begin_picture()
     held = [library.Shader(compute_program(name="dropped"))]
+    kept = held[0].kept
     thread = threading.Thread(target=held.clear)
     thread.start()
     thread.join()
-    assert len(library._dropped) == 1
+    assert any(one is kept for one in library._dropped)
     context.begin_picture()
-    assert not library._dropped
+    assert not any(one is kept for one in library._dropped)
+
+
+def test_a_program_is_not_freed_while_a_batch_holds_it(gpu_context):
+    """Blender's batches hold the program that they drew last: the next draw would free it, in whichever context."""
+    from addon.gfx import images, passes
+
+    def drawn(name):
+        program = passes.fullscreen_program(
+            name, "generated/main", outputs=(("VEC4", "out_color"),),
+            snippets=(("generated/main", "void main() { out_color = vec4(1.0); }"),),
+        )  # fmt: skip
+        passes.fullscreen(program, images.Target((images.create(4, 4, "RGBA32F"),)))
+        return program
+
+    kept = library._shaders.pop(drawn("held")).kept
+    is_held = not kept.is_alone  # not by batches of 4.5
+    library._free_dropped()
+    assert any(one is kept for one in library._dropped) == is_held
+    drawn("another")
+    library._free_dropped()
+    assert not any(one is kept for one in library._dropped)
 
 
 def test_a_program_that_goes_in_a_final_renders_context_is_freed_where_it_was_drawn(gpu_context):
-    """Mesa ends with a segmentation fault otherwise, some draws later."""
+    """Or compiled: Mesa ends with a segmentation fault otherwise, some draws later."""
     import bpy
 
     from addon.gfx import images, passes
@@ -165,18 +187,23 @@ def test_a_program_that_goes_in_a_final_renders_context_is_freed_where_it_was_dr
 
         def render(self, depsgraph):
             with images.passing_context():
-                del library._shaders[goes]
+                waiting.extend(library._shaders.pop(program).kept for program in (goes, only_compiled))
                 library._free_dropped()
-                waiting.append(len(library._dropped))
+                waits.append(waiting_of() == len(waiting))
+
+    def waiting_of():
+        return sum(any(one is kept for one in library._dropped) for kept in waiting)
 
     library._free_dropped()
-    waiting, target = [], images.Target((images.create(4, 4, "RGBA32F"),))
+    waits, waiting, target = [], [], images.Target((images.create(4, 4, "RGBA32F"),))
     bpy.ops.wm.read_factory_settings()
     bpy.utils.register_class(Other)
     try:
         render = bpy.context.scene.render
         render.engine, render.resolution_x, render.resolution_y = Other.bl_idname, 16, 16
         for _ in range(3):
+            only_compiled = compute_program(name="only compiled")
+            library.get(only_compiled)
             goes, stays = drawn("other"), drawn("same")
             images.read(target.colors[0])
             bpy.ops.render.render()
@@ -186,7 +213,49 @@ def test_a_program_that_goes_in_a_final_renders_context_is_freed_where_it_was_dr
     finally:
         bpy.utils.unregister_class(Other)
     library._free_dropped()
-    assert waiting == [1, 2, 3] and not library._dropped
+    assert waits == [True] * 3 and waiting_of() == 0
+
+
+def test_contexts_of_renders_do_not_hold_the_program_that_they_drew_last(gpu_context):
+    """It would end where they draw the next one; Mesa ends with a segmentation fault then."""
+    import bpy
+
+    from addon.gfx import images, passes
+
+    programs = [
+        passes.fullscreen_program(
+            name, "generated/main", outputs=(("VEC4", "out_color"),),
+            snippets=(("generated/main", "void main() { out_color = vec4(1.0); }"),),
+        )
+        for name in ("of both", "of this one", "of the render")
+    ]  # fmt: skip
+    of_both, here, there = programs
+    turns = iter((of_both, there, there))
+
+    class Other(bpy.types.RenderEngine):
+        bl_idname, bl_label, bl_use_gpu_context = "CANDELA_OTHER", "Other", True
+
+        def render(self, depsgraph):
+            with images.passing_context():
+                passes.fullscreen(next(turns), target)
+
+    target = images.Target((images.create(4, 4, "RGBA32F"),))
+    bpy.ops.wm.read_factory_settings()
+    bpy.utils.register_class(Other)
+    try:
+        render = bpy.context.scene.render
+        render.engine, render.resolution_x, render.resolution_y = Other.bl_idname, 16, 16
+        passes.fullscreen(of_both, target)
+        bpy.ops.render.render()  # its context draws it last
+        passes.fullscreen(here, target)
+        del library._shaders[of_both]
+        library._free_dropped()
+        for _ in range(2):  # in these it would end, and what this context has bound be taken away
+            bpy.ops.render.render()
+            passes.fullscreen(here, target)
+            assert images.read(target.colors[0])[0, 0, 0] == 1.0
+    finally:
+        bpy.utils.unregister_class(Other)
 
 
 def test_a_program_that_failed_is_tried_again(gpu_context):
