@@ -26,6 +26,8 @@ BRINGS = {
 }
 
 COLOURED = ("instant_radiosity", "multires_radiosity", "clustered_visibility")  # whose rays take colours of layers
+GEM = 2.0  # index of refraction, from which on most directions are mirrored totally
+GEM_INTERFACES = 24  # crossings that such glass needs
 NO_GRASS = ("no material", "it is not in the pass tree")  # how reasons begin that nobody need hear
 
 
@@ -34,7 +36,23 @@ def notes_of(
 ) -> tuple[Note, ...]:
     """None for most scenes. `materials`: the snapshot's, compiled."""
     tinted = (one for k, one in enumerate(materials) if one.tinted and k in snapshot.used_materials)
-    return (*_for_size(plan, snapshot), *_where_systems_meet(plan, settings), *_bounces_past(plan, tinted))
+    used = (one for k, one in enumerate(materials) if k in snapshot.used_materials)
+    return (
+        *_for_size(plan, snapshot), *_where_systems_meet(plan, settings), *_bounces_past(plan, tinted),
+        *_kept_inside(plan, settings, used),
+    )  # fmt: skip
+
+
+def _kept_inside(plan: Plan, settings: Settings, used: Iterable[CompiledMaterial]) -> Iterator[Note]:
+    """Gems, out of which much light comes after more total reflections than are followed."""
+    rays = next((technique for technique in plan.techniques if technique.name == "traced_refraction"), None)
+    if rays is None or (followed := settings.get(rays, "interfaces")) >= GEM_INTERFACES:
+        return
+    for one in used:
+        if one.glass is not None and one.glass.share > 0.0 and one.glass.ior >= GEM:
+            inside = f"its index of {one.glass.ior:.2f} mirrors light inside more often than the {followed} Interfaces"
+            text = f"{inside} of {rays.label} follow, and it looks too dark: raise them to 32."
+            yield Note(f"Material '{one.name}'", text, one.name)
 
 
 def _bounces_past(plan: Plan, tinted: Iterable[CompiledMaterial]) -> Iterator[Note]:

@@ -96,3 +96,18 @@ def test_coloured_layers_that_bounced_light_passes_as_grey_are_named(monkeypatch
     assert left_out.notes_of(Plan((), (), {"indirect": "instant_radiosity"}), scene, FEW, glowing)
     for filled in ({}, {"indirect": "instant_radiosity"}):
         assert left_out.notes_of(Plan((), (), filled), scene, FEW, materials) == ()
+
+
+def test_gems_that_mirror_more_often_than_is_followed_are_named(monkeypatch):
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    scene = SimpleNamespace(camera=None, used_materials={0, 1})
+    materials = [
+        SimpleNamespace(name=name, tinted=False, emissive=False, glass=SimpleNamespace(ior=ior, share=1.0))
+        for name, ior in (("Window", 1.5), ("Diamond", 2.42))
+    ]
+    plan = Plan((SimpleNamespace(name="traced_refraction", label="Refraction"),), (), {})
+    few, enough = (SimpleNamespace(bounces=0, get=lambda technique, name, n=n: n) for n in (8, 32))
+    (note,) = left_out.notes_of(plan, scene, few, materials)
+    assert note.subject == "Material 'Diamond'" and "2.42" in note.text and "8 Interfaces" in note.text
+    assert left_out.notes_of(plan, scene, enough, materials) == ()
