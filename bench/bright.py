@@ -31,12 +31,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> int:
     import addon
     from addon.compare.reference import render_passes
-    from bench import reflection_scenes
+    from bench import glass_scenes, reflection_scenes
 
     addon.register()
     size = tuple(int(side) for side in options.size.split("x"))
     rows, total = [["scene", "by surroundings", "and truth"]], 0
-    for name in options.scenes or (*reflection_scenes.SCENES, *FILES):
+    for name in options.scenes or (*reflection_scenes.SCENES, *glass_scenes.SCENES, *FILES):
         scene = _opened(name)
         image = render_passes(scene, "CANDELA", options.samples, 1, size=size).images["combined"]
         alone, found = isolated(luminance(image)), 0
@@ -80,10 +80,10 @@ def isolated(light: np.ndarray) -> np.ndarray:
 def _opened(name: str):
     import bpy
 
-    from bench import reflection_scenes
+    from bench import glass_scenes, reflection_scenes
     from bench.cells import ROOT
 
-    if name in reflection_scenes.SCENES:
+    if name in reflection_scenes.SCENES | glass_scenes.SCENES:
         return reflection_scenes.make(name)
     file = Path(name) if name.endswith(".blend") else ROOT / "sample_blends" / f"{name}.blend"
     bpy.ops.wm.open_mainfile(filepath=str(file))
