@@ -340,20 +340,24 @@ class Hits:
     def shading(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
         closures: images.Target, number: int = 0, masked: bool = False, path: images.Image | None = None,
+        both_ways: bool = False,
     ) -> Iterator[None]:  # fmt: skip
         """Evaluate these materials at the records into `closures` (take_closures), which is cleared before; `masked`:
         of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0;
-        `path`: what the rays' paths let pass (rgb), by which lobes are chosen. In parts: after each program that draws
-        for the first time, which takes the driver long."""
+        `path`: what the rays' paths let pass (rgb), by which lobes are chosen; `both_ways`: smooth glass is one lobe,
+        as goes_both_ways has it. In parts: after each program that draws for the first time, which takes the driver
+        long."""
         images.Target(closures.colors[:1] if masked else closures.colors).clear()
         leaders = {frame.materials.leaders[k] for k in materials}
         # One program after the other: between materials that share one, only what differs is bound.
         order = sorted(leaders, key=lambda k: (_program_key(frame.materials.compiled[k]), k))
         fresh = [k for k in order if _program_key(frame.materials.compiled[k]) not in self._compiled]
         for material in fresh:
-            self._draw(frame, ray_direction, path, records, [material], closures, number)
+            self._draw(frame, ray_direction, path, records, [material], closures, number, both_ways)
             yield
-        self._draw(frame, ray_direction, path, records, [k for k in order if k not in fresh], closures, number)
+        self._draw(
+            frame, ray_direction, path, records, [k for k in order if k not in fresh], closures, number, both_ways
+        )
         if self._flagged:
             with images.borrowed(1, 1, "R32F") as count:
                 number_of_all = {"material_count": len(frame.materials.compiled)}
@@ -364,7 +368,7 @@ class Hits:
 
     def _draw(
         self, frame: Frame, ray_direction: images.Image, path: images.Image | None, records: Records, order: list[int],
-        closures: images.Target, number: int,
+        closures: images.Target, number: int, both_ways: bool,
     ) -> None:  # fmt: skip
         """Evaluate materials, by their leaders, in this order."""
         if not order:
@@ -376,7 +380,7 @@ class Hits:
         view, shader = {"film_view": frame.view_block}, None
         with passes.drawing(closures, depth_test="EQUAL", depth_write=False):
             for material in order:
-                program, own = self._own_bindings(frame, material, number)
+                program, own = self._own_bindings(frame, material, number, both_ways)
                 if ("INT", "path_known") in program.constants:
                     own["constants"]["path_known"] = int(path is not None)
                 if program.textures and ("UINT_2D", "materials_met") in program.textures:
@@ -395,7 +399,7 @@ class Hits:
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))
 
-    def _own_bindings(self, frame: Frame, material: int, number: int) -> tuple[Program, dict]:
+    def _own_bindings(self, frame: Frame, material: int, number: int, both_ways: bool) -> tuple[Program, dict]:
         """The program of a material, and what it binds besides records, rays, instances and the view."""
         compiled = frame.materials.compiled[material]
         constants: dict[str, object] = {"material_depth": depth_of(material), "material_number": material}
@@ -410,7 +414,7 @@ class Hits:
             textures |= frame.materials.own_images[material]
         if compiled.attributes:
             textures["hit_attributes"] = self._attributes_of(material, compiled)
-        constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}
+        constants |= {"ray_number": number, "glass_bends": (1 + both_ways) * int(refracts(frame))}
         return hit_program(compiled), {"textures": textures, "blocks": bound["blocks"], "constants": constants}
 
     # What is shaded ---------------------------------------------------------------------------------------------------

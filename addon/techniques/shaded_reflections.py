@@ -9,8 +9,9 @@ which is traced, of other surfaces by virtual lights. Where what is met is itsel
 Both a ray and a point may find the same light: they are weighted by the power heuristic (Veach 1997). What the first
 surface reflects of lamps and the world is left to traced_glossy.py, and what it lets pass of them to
 traced_refraction.py, whose walks by mean colours this technique replaces. Of smooth glass (Glass, and
-Principled's Transmission; roughness up to BOTH_ROUGHNESS) both ways are followed in each sample, what it lets pass and
-what it mirrors; of other lobes of a surface one is kept, and at what rays have met, too.
+Principled's Transmission; roughness up to BOTH_ROUGHNESS) both ways are followed in each sample: what it lets pass,
+and what it mirrors. In pictures of few samples so it is at up to MOST_THROUGH such surfaces behind it, of which one is
+chosen that mirrors. Of other lobes of a surface one is kept, and at what rays have met, too.
 
 | cost | per sample and bounce |
 |---|---|
@@ -87,6 +88,8 @@ REACH = (
 )
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
+MOST_THROUGH = 4  # surfaces behind the first of which both ways are followed, as in shaders/hits/path.glsl
+FEWEST_BY_CHANCE = 8  # samples, from which on those are left to chance: an eighth less time at the same error
 BOTH_ROUGHNESS = 0.3  # of glass of which both ways are followed, as in lib/closure.glsl
 LOBE = SURFACE_IMAGES.index("lobe")
 ORDERS = ("direct", "indirect")
@@ -110,7 +113,7 @@ def scatter_program(onward: bool) -> Program:
             ("FLOAT", "offset_size"),
             ("FLOAT", "clear_roughness"),
             ("FLOAT", "first_rays"),
-            *(() if onward else (("INT", "mirrored_way"),)),
+            ("INT", "way"),
         ),
         defines=(("ONWARD", "1"),) if onward else (),
         outputs=(
@@ -225,7 +228,7 @@ class ShadedReflections(Technique, BothWays):
         )  # fmt: skip
         self._active = False
         self._first_rays = 0.0
-        self._turns, self._mirror_turns = Turns(self, MOST_PARTS), Turns(self, MOST_PARTS)  # of the ways of glass
+        self._turns = [Turns(self, MOST_PARTS) for _ in range(3)]  # of the ways of glass (hits/scatter.frag.glsl)
         self._onward = True  # whether rays may go on from what they meet
         self._guides: tuple[str, ...] = (SHOWN,)
         self._into: dict[str, images.Image] = {}  # what this bounce adds to, by name
@@ -263,7 +266,7 @@ class ShadedReflections(Technique, BothWays):
                 )
         self._guides = tuple(name for name in (SHOWN, SHOWN_THROUGH) if name in frame.images)
         guide = self._guides if frame.settings.samples > 1 else ()
-        for turns in (self._turns, self._mirror_turns):
+        for turns in self._turns:
             turns.begin(frame, (*_names(refracts(frame), ORDERS), *guide))
 
     def follows_both_ways(self, frame: Frame) -> bool:
@@ -281,7 +284,9 @@ class ShadedReflections(Technique, BothWays):
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
             return
-        turns = (self._turns, self._mirror_turns) if goes_both_ways(frame) else (self._turns,)
+        both = goes_both_ways(frame)
+        behind = both and frame.settings.samples < FEWEST_BY_CHANCE
+        turns = self._turns[: 1 + both + behind]
         ways = [(way, one) for way, one in enumerate(turns) if one.weight(frame)]
         if not ways:
             frame.kept(CausticMaps).done()
@@ -316,7 +321,7 @@ class ShadedReflections(Technique, BothWays):
                         yield
                         yield from hits.shading(
                             frame, self, rays.colors[1], records, met, closures, number, masked=True,
-                            path=rays.colors[2],
+                            path=rays.colors[2], both_ways=behind and number < MOST_THROUGH,
                         )  # fmt: skip
                         yield
                         if edits is not None:
@@ -344,7 +349,7 @@ class ShadedReflections(Technique, BothWays):
                         bound = closure_bindings(closures)
                         if edits is not None:  # what bends light has its edit with the ray until that leaves
                             closures.colors[LOBE].beside["carried_edit"] = turned.colors[1]
-                        self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
+                        self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before, way)
                         closures.colors[LOBE].beside = {}
                         rays, onward = onward, rays
         finally:  # also where a viewport drops the sample
@@ -360,7 +365,7 @@ class ShadedReflections(Technique, BothWays):
         return images.Target(tuple(images.pool.take(*frame.size, layout) for layout, _ in STATE))
 
     def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before, way: int = 0) -> None:
-        """Rays of the lobes of `surfaces`, into `rays`. `way` 1, of the first: what glass mirrors, too."""
+        """Rays of the lobes of `surfaces`, into `rays`. `way`: of glass that goes both ways."""
         images.Target(rays.colors[1:2]).clear()  # a ray without direction is none, whatever else stands there
         passes.fullscreen(
             scatter_program(bool(before)),
@@ -371,7 +376,7 @@ class ShadedReflections(Technique, BothWays):
             constants={
                 **reach, "ray_number": number, "offset_size": frame.offset_size,
                 "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
-                "first_rays": self._first_rays, **({} if before else {"mirrored_way": way}),
+                "first_rays": self._first_rays, "way": way,
             },
         )  # fmt: skip
         frame.count(self, "passes")
@@ -475,8 +480,8 @@ class ShadedReflections(Technique, BothWays):
 
     def release(self) -> None:
         self._sources.release()
-        self._turns.drop()
-        self._mirror_turns.drop()
+        for turns in self._turns:
+            turns.drop()
 
 
 def _state(rays: images.Target) -> dict[str, images.Image]:

@@ -5,6 +5,8 @@
 #define PATH_CLEAR 8         // added where all surfaces so far were clear glass that let it pass (Film > Transparent Glass)
 #define PATH_EDITED 16       // added until it leaves a closed object whose edit turns what leaves it
 #define PATH_MIRROR 32       // added for each surface so far that mirrored it
+#define PATH_THROUGH 0.25     // added as long as glass that goes both ways has let it pass; alone: what is met is another way's
+#define MOST_THROUGH 4       // such surfaces behind the first; as in addon/techniques/shaded_reflections.py
 #define FOUND_ELSEWHERE -1.0 // in place of a ray's density: light samples have all that it finds of emission
 
 bool path_is_glossy(int code)
@@ -25,6 +27,12 @@ bool path_is_clear(int code)
 bool path_is_edited(int code)
 {
   return (code & PATH_EDITED) != 0;
+}
+
+// `w`: of the path.
+bool path_goes_through(float w)
+{
+  return w - floor(w) > 0.1;
 }
 
 // How many surfaces mirrored it: bounces. Interfaces that bend it are none.

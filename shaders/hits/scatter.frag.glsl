@@ -1,5 +1,9 @@
 // Rays of the lobes that surfaces have kept: mirrored up to `shaded_roughness`, or bent. Of what the camera sees, or, with
 // ONWARD, of what rays have met. `travelled`: how far light samples of the last lobe were from where the ray starts, m.
+//
+// Of smooth glass, one surface behind the other from the camera on, each way is a pass of its own (`way`): 0 goes through
+// all of them, 1 is mirrored by the first, 2 by one of the others, drawn by mirror_depth. So what is seen through panes and
+// bodies of glass is no matter of chance; pictures of many samples go without 2, and leave it to chance. Rays of 2 that come to that one show nothing on their way: 0 has it.
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
@@ -7,6 +11,16 @@
 #include "trace/origin.glsl"
 #include "hits/path.glsl"
 #include "hits/onward.glsl"
+
+#define LEAST_MIRRORED 0.05  // as in hits/surface.frag.glsl
+
+// Which surface behind the first mirrors, of paths that others let pass, and with what chance it is that one.
+int mirror_depth(ivec2 pixel, out float chance)
+{
+  float x = shuffled(film_view.sample_index, hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 977u)).xy);
+  chance = (x < 0.6) ? 0.6 : 0.4 / float(MOST_THROUGH - 1);
+  return (x < 0.6) ? 1 : min(2 + int((x - 0.6) / chance), MOST_THROUGH);
+}
 
 void main()
 {
@@ -20,12 +34,13 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
+  bool both = surface_goes_both_ways(s);
 #ifndef ONWARD
-  if (mirrored_way != 0) {  // of glass that goes both ways; the other way all lobes go
-    if (!surface_goes_both_ways(s)) {
+  if (way != 0) {  // of glass that goes both ways; the other way all lobes go
+    if (!both) {
       return;
     }
-    s = surface_mirrored(s);
+    s = (way == 1) ? surface_mirrored(s) : s;
   }
 #endif
 #ifdef ONWARD
@@ -38,9 +53,11 @@ void main()
   int mirrored = path_mirrors(code);
   bool edited = path_is_edited(code) || (edits_what_leaves(s) && s.glossy_ior > 1.0);
   code = (code & 3) + PATH_MIRROR * mirrored;
-  if (code == 0) {
+  bool through = path_goes_through(before.w);
+  if (code == 0 && !through) {
     return;
   }
+  code = (code == 0) ? PATH_TRANSMISSION : code;
 #else
   vec3 viewer = TO_VIEWER(s);
   float width = view_pixel() * view_growth(s.position);
@@ -49,6 +66,33 @@ void main()
   bool clear = true;
   int mirrored = 0;
   bool edited = edits_what_leaves(s);
+  bool through = both && way != 1;
+#endif
+  float kept = 1.0;  // chance of the way that the path takes
+  bool found_by_rays = false;  // whether light samples leave out the lobe
+#ifdef ONWARD
+  float mirrors_of_all = max_component(fresnel_reflectance(FRESNEL_DIELECTRIC, s.glossy_tint, vec3(1.0), s.glossy_ior, dot(s.glossy_normal, viewer)));
+  bool apart = through && both && ray_number <= MOST_THROUGH && mirrors_of_all < 0.5;
+  if (way == 2 && through && !apart) {
+    return;
+  }
+  if (apart && way == 2) {
+    through = ray_number < mirror_depth(pixel, kept);
+    kept = through ? 1.0 : kept;
+    found_by_rays = !through;
+    s = through ? s : surface_mirrored(s);
+  }
+  else if (both && !apart) {
+    Surface mirror = surface_mirrored(s);
+    float share = max_component(mirror.glossy_weight) / max(max_component(s.glossy_weight), 1e-6);
+    float mirrored_part = (mirrors_of_all > 0.0) ? share * max(mirrors_of_all, LEAST_MIRRORED) : 0.0;
+    float chance = mirrored_part / max(mirrored_part + 1.0 - mirrors_of_all, 1e-6);
+    uvec3 roll = roll_of(pixel, 0, film_view.seed, 81 + ray_number);
+    found_by_rays = shuffled(film_view.sample_index, roll.xy) < chance;
+    kept = found_by_rays ? chance : 1.0 - chance;
+    s = found_by_rays ? mirror : s;
+  }
+  through = through && apart;
 #endif
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
   vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));
@@ -91,7 +135,8 @@ void main()
     density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
 #endif
   }
-  throughput *= weight;
+  throughput *= weight / max(kept, 1e-6);
+  density = found_by_rays ? 0.0 : density;
   float most = max_component(throughput);
   if (!(most > 1e-4) || !is_finite(most)) {
     return;
@@ -103,5 +148,5 @@ void main()
     out_origin.w = -width;
   }
   out_direction = vec4(direction, density);
-  out_path = vec4(throughput, float(code));
+  out_path = vec4(throughput, (through && way == 2) ? PATH_THROUGH : float(code) + (through ? PATH_THROUGH : 0.0));
 }

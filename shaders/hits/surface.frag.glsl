@@ -17,6 +17,7 @@
 #endif
 // Inside glass what it mirrors is no brighter than what it lets pass: asked for seldom, it would be grain.
 #define LEAST_MIRRORED 0.05
+#define BOTH_WAYS (glass_bends == 2)
 #include "generated/material"
 #include "hits/point.glsl"
 #ifdef OWN_SURFACE

@@ -223,3 +223,16 @@ def test_light_that_is_red_leaves_a_prism_by_the_glass_for_red(stage):
     seen = stage.render(16, (16, 16), bounces=8)["combined"][..., :3]
     assert seen.mean() == pytest.approx(1.0, abs=0.05)
     assert seen.max() < 1.5
+
+
+def test_one_sample_sees_through_a_pane_without_grain(stage):
+    """Before a shining wall in a dark room: what the far side of a pane mirrors is black."""
+    wall = stage.material("ShaderNodeEmission", Strength=1.0)
+    stage.mesh([(-9, -9, -2), (9, -9, -2), (9, 9, -2), (-9, 9, -2)], [(0, 1, 2, 3)], material=wall)
+    bpy.ops.mesh.primitive_cube_add(size=1)
+    bpy.context.object.scale = (20, 20, 0.1)
+    bpy.context.object.data.materials.append(stage.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0))
+    stage.camera_above(2.0)
+    found = stage.render(1, (16, 16), bounces=4)["combined"][..., :3]
+    assert found.mean() == pytest.approx(0.96**2, rel=0.03)
+    assert found.min() > 0.9 and found.max() < 1.0
