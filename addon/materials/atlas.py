@@ -14,6 +14,7 @@ import numpy as np
 
 PREFIX = "atlas "
 WIDEST = 16384  # pixels: what every GPU has
+FEW_ROWS, MOST_LONG = 16, 64  # of an image without levels: its shorter side, and the longer one by that
 
 
 def atlas_key(keys: Sequence[str]) -> str:
@@ -52,9 +53,13 @@ def rows_with_levels(width: int, height: int) -> int:
 
 
 def texture_layout(sizes: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int], bool]:
-    """Lower left corners of images of these sizes in one texture, its size, and whether there is room for levels."""
+    """Lower left corners of images of these sizes in one texture, its size, and whether it has levels: where there is
+    room for them, and no image is so long beside its width that levels, which halve both, would average all of the
+    shorter side where the longer one is seen small."""
     corners, whole = layout([(width, rows_with_levels(width, height)) for width, height in sizes])
-    if max(whole) <= WIDEST:
+    if max(whole) <= WIDEST and not any(
+        1 < min(size) < FEW_ROWS and MOST_LONG * min(size) <= max(size) for size in sizes
+    ):
         return corners, whole, True
     return *layout(sizes), False
 

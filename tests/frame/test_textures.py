@@ -63,6 +63,14 @@ def test_a_large_texture_of_bytes_with_levels_takes_a_third_of_what_floats_took(
     assert small.size == (64, rows_with_levels(64, 64)) and small.bytes == 4 * 64 * rows_with_levels(64, 64)
 
 
+@pytest.mark.parametrize(
+    ("size", "levels"), [((1024, 2), False), ((2, 1024), False), ((1024, 1), True), ((1024, 32), True)]
+)
+def test_levels_of_long_images_would_mix_their_few_rows(size, levels):
+    """A level halves both sides; a single row stays what it is."""
+    assert texture_layout([size])[2] == levels
+
+
 def test_an_image_too_high_for_its_levels_has_none():
     assert not texture_layout([(16, 14000)])[2]
     assert texture_layout([(14000, 16)])[2]
