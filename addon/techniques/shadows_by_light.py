@@ -209,7 +209,10 @@ class ShadowsByLight(PointMaps):
         return kinds
 
     def _weights(self, frame: Frame) -> Weighed | None:
-        """What is known of lights' errors, where probes asked and the user wants it weighed."""
+        """What is known of lights' errors, where probes asked and the user wants it weighed. Of casters that maps draw
+        at random, texel by texel, probes know the mean alone: points of the light would be noisier than they tell."""
+        if drawn_stochastically(frame):
+            return None
         rates = frame.service(LightRates)
         known = rates is not None and rates.variance and frame.settings.samples == 1
         return Weighed(frame.size, rates) if known and frame.settings.get(self, "few_points") else None

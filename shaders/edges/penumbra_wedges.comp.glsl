@@ -183,7 +183,12 @@ void main()
 #endif
   }
 #ifdef CARDS
+  // Where on the light cards and solids hide it is known of neither: leaves lie before a trunk as often as beside it.
+#ifdef UNION_SUM
   share = clamp(share + cards_share_fetch(pixel).x - 1.0, 0.0, 1.0);
+#else
+  share *= cards_share_fetch(pixel).x;
+#endif
 #endif
   imageStore(seen_share, pixel + ivec2(0, edge_light.picture_row), vec4(share, 0.0, 0.0, 0.0));
 }

@@ -209,8 +209,28 @@ def test_shares_stay_between_plain_sum_and_all(by_wedges):
     assert (found <= 1 + 1e-5).all() and (found >= least - 1e-4).all()
 
 
-def test_alpha_casters_are_added(by_wedges):
+def test_alpha_casters_before_a_solid_let_their_share_of_the_rest_pass(by_wedges):
+    """A veil of half opacity before a plane: the product, where a sum would have black spots behind both."""
     stage = by_wedges
+    stage.floor()
+    half_plane(stage, x=-0.2)
+    sheet = with_alpha(stage, np.full((4, 4), 0.5), "Closest")
+    card = stage.card(sheet, 0, 1, location=(0, 0, 2), scale=(8, 8, 1))
+    card.visible_camera = False
+    square(stage)
+    stage.camera_above(span=2.0)
+    size = (64, 4)
+    x, _ = places(size, 2.0)
+    expected = 0.5 * np.clip(0.5 - np.maximum(-0.5, -0.4 - x), 0, 1)
+    found = share(stage, size)  # noisy: each point of the lamp meets the veil or does not
+    assert abs((found - expected).mean()) < 0.01
+    stage.scene.candela.penumbra_wedges_union = "SUM"
+    assert (expected - share(stage, size)).mean() > 0.05
+
+
+def test_alpha_casters_are_added_in_a_plain_sum(by_wedges):
+    stage = by_wedges
+    stage.scene.candela.penumbra_wedges_union = "SUM"
     stage.floor()
     half_plane(stage, x=-0.2)
     sheet = with_alpha(stage, np.arange(64)[None] * np.ones((64, 1)) < 32, "Closest")

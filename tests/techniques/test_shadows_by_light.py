@@ -170,6 +170,12 @@ def test_points_are_taken_where_soft_maps_are_not_worth_their_time(plate):
     )
     plate.scene.candela.slot_shadow = "accumulated_maps"
     assert np.array_equal(irradiance(plate, 1, (32, 32)), found)
+    plate.scene.candela.slot_shadow = "AUTO"
+    veil = plate.blocker((-0.4, -0.4), (0.4, 0.4), 1.5)  # whose points are noisier than probes tell
+    veil.data.materials.clear()
+    veil.data.materials.append(plate.see_through(0.5))
+    irradiance(plate, 1, (32, 32))
+    assert by_light.PLAIN not in counters(plate)
 
 
 @pytest.mark.parametrize(("side", "variance", "best"), [(64, 0.02, "points"), (64, 4.0, "maps"), (1024, 0.02, "maps")])
