@@ -110,6 +110,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
         "--frames", metavar="A-B", type=_frames,
         help="several frames, such as 1-10, 1-100:5 or 1,3,7; the name of the output has #### for their number",
     )  # fmt: skip
+    render.add_argument("--skip-existing", action="store_true", help="leave pictures that are there as they are")
     render.add_argument("--show", metavar="IMAGE", help="write this intermediate image in place of the picture")
     render.add_argument("--slice", metavar="K/N", help="the Kth of N parts of the samples, as .exr; see merge")
     _add_farming(render)
@@ -134,6 +135,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     job.add_argument("--results", metavar="FOLDER", type=Path, help="for the pictures (default: in the job's folder)")
     job.add_argument("--format", choices=("png", "exr"), default="exr", help="of the pictures (default exr)")
     job.add_argument("--extensions", metavar="FOLDER", help="shared folder of extensions that nodes find Candela in")
+    job.add_argument("--skip-existing", action="store_true", help="a task that is tried again keeps what it finished")
     job.add_argument("--gpu", action="store_true", help="ask for nodes with a GPU")
     job.set_defaults(verb=farm.write_job, opens=True)
     against = commands.add_parser("compare", help="render by Candela and by Cycles, and compare", **add)

@@ -1,6 +1,10 @@
 // A job type of Flamenco 3 for Candela: chunks of frames, slices of samples, and what puts the slices together.
 // It stands in the folder `scripts` beside the manager. Nodes need Blender with Candela, and a shared folder of files.
 
+// What the job that this file was written for asks of every task, and of those that render: `farm` puts it here.
+const OF_EVERY_TASK = [];
+const OF_RENDERING = [];
+
 const JOB_TYPE = {
     label: "Candela",
     description: "Render by Candela; the samples of a picture may be shared by several workers",
@@ -35,7 +39,8 @@ function compileJob(job) {
             const title = split > 1 ? `render-${chunk}-slice-${k}` : `render-${chunk}`;
             const share = split > 1 ? ["--slice", `${k}/${split}`, "--output", sliceFile(k)] : ["--output", picture];
             const task = author.Task(title, "blender");
-            task.addCommand(candela(["render", settings.blendfile, `--frames=${chunk}`, ...share]));
+            task.addCommand(candela(
+                ["render", settings.blendfile, `--frames=${chunk}`, ...OF_RENDERING, ...share]));
             job.addTask(task);
             rendered.push(task);
         }
@@ -52,5 +57,5 @@ function compileJob(job) {
 }
 
 function candela(args) {
-    return author.Command("exec", { exe: "{blender}", args: ["--command", "candela", ...args, "--progress"] });
+    return author.Command("exec", { exe: "{blender}", args: ["--command", "candela", ...args, ...OF_EVERY_TASK, "--progress"] });
 }

@@ -69,7 +69,7 @@ def write_job(job: Job) -> None:
             ("asset_references.json", {"assetReferences": references}),
         ):
             (place / file).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        (place / "candela.js").write_bytes(FLAMENCO.read_bytes())
+        (place / "candela.js").write_text(flamenco(options), encoding="utf-8")
     tasks = len(parts) * options.split_samples
     print(
         f"{len(frames)} frames in {len(parts)} chunks, {options.split_samples} slices of each: {tasks} tasks of Render"
@@ -94,12 +94,15 @@ def launch() -> list[str]:
     return [sys.executable, "-m", "addon"]
 
 
-def template(name: str, parts: list[str], start: list[str], options) -> dict:
-    """The job template, as plain data."""
-    suffix, split = options.format, options.split_samples
-    common = ["--progress", "--expect", ".".join(map(str, bpy.app.version[: 3 if options.split_samples > 1 else 2]))]
-    common += ["--run-scripts"] if options.run_scripts else []
-    chosen = []
+def of_every_task(options) -> list[str]:
+    """Options of the command line for tasks of every kind."""
+    exact = 3 if options.split_samples > 1 else 2  # numbers of the version
+    return ["--expect", ".".join(map(str, bpy.app.version[:exact]))] + ["--run-scripts"] * options.run_scripts
+
+
+def of_rendering(options) -> list[str]:
+    """Options of the command line for tasks that render."""
+    chosen = ["--skip-existing"] * options.skip_existing
     for flag, value in (
         ("--samples", options.samples),
         ("--size", options.size and "x".join(map(str, options.size))),
@@ -108,6 +111,21 @@ def template(name: str, parts: list[str], start: list[str], options) -> dict:
         *(("--set", text) for text in options.assignments),
     ):
         chosen += [f"{flag}={value}"] if value is not None else []  # a name may begin with a dash
+    return chosen
+
+
+def flamenco(options) -> str:
+    """The text of the job type of Flamenco, with what this job asks of its tasks."""
+    text = FLAMENCO.read_text(encoding="utf-8")
+    for name, arguments in (("OF_EVERY_TASK", of_every_task(options)), ("OF_RENDERING", of_rendering(options))):
+        text = text.replace(f"const {name} = [];", f"const {name} = {json.dumps(arguments)};")
+    return text
+
+
+def template(name: str, parts: list[str], start: list[str], options) -> dict:
+    """The job template, as plain data."""
+    suffix, split = options.format, options.split_samples
+    chosen, common = of_rendering(options), ["--progress", *of_every_task(options)]
     chunk = {"name": "Chunk", "type": "STRING", "range": parts}
     picture = f"{FOLDER}/{name}_####.{suffix}"
     render = ["render", FILE, *chosen, *common, "--frames={{Task.Param.Chunk}}"]

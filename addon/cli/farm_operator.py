@@ -47,8 +47,8 @@ class CandelaFarmJob(bpy.types.Operator):
         options = argparse.Namespace(
             file=Path(bpy.data.filepath), output=Path(bpy.path.abspath(self.directory)), results=None, frames=None,
             chunk=self.chunk, split_samples=self.split_samples, format=self.format, gpu=self.gpu, extensions=None,
-            run_scripts=False, samples=None, size=None, scene=context.scene.name, view_layer=None, assignments=[],
-            frame=None,
+            run_scripts=False, skip_existing=False, samples=None, size=None, scene=context.scene.name, view_layer=None,
+            assignments=[], frame=None,
         )  # fmt: skip
         try:
             farm.write_job(Job(options, context.scene, None))

@@ -145,6 +145,11 @@ def render(job: Job) -> None:
         _share_out(job, path)
     paths = {frame: numbered(path, frame, frames is not None) for frame in frames or [scene.frame_current]}
     untrusted.refuse_inputs(list(paths.values()))
+    if getattr(options, "skip_existing", False):
+        there = [one for one in paths.values() if one.exists()]
+        paths = {frame: one for frame, one in paths.items() if one not in there}
+        if there:
+            print(f"{len(there)} pictures are there already and are left as they are.")
     for place, (frame, one) in enumerate(paths.items()):
         if frame != scene.frame_current:
             with quiet(options.verbose):

@@ -191,6 +191,17 @@ def test_frames_of_a_chunk_are_rendered_by_one_process_with_lines_for_farms(movi
 
 
 @pytest.mark.slow
+def test_pictures_that_are_there_are_left_if_asked(moving, tmp_path):
+    there = tmp_path / "m_0002.png"
+    there.write_bytes(b"finished before")
+    done = candela("render", moving, "--size", "16x12", "--samples", "1", "--frames", "2-3", "--skip-existing",
+                   "--output", "m_####.png", folder=tmp_path)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert there.read_bytes() == b"finished before" and (tmp_path / "m_0003.png").stat().st_size > 100
+    assert "1 pictures are there already" in done.stdout
+
+
+@pytest.mark.slow
 def test_what_a_killed_process_was_writing_goes_with_the_next(moving, tmp_path):
     arguments = [sys.executable, "-m", "addon", "render", str(moving), "--size", "64x48", "--samples", "4000",
                  "--output", str(tmp_path / "out" / "a.png")]  # fmt: skip
@@ -402,6 +413,26 @@ const job = { settings: JSON.parse(process.argv[3]), addTask: (task) => made.pus
 eval(fs.readFileSync(process.argv[2], "utf-8") + "; compileJob(job); globalThis.type = JOB_TYPE");
 console.log(JSON.stringify({ type, made }));
 """
+
+
+def test_the_job_type_of_flamenco_asks_what_its_job_was_asked():
+    from argparse import Namespace
+
+    import bpy
+
+    from addon.cli import farm
+
+    options = Namespace(
+        split_samples=2, run_scripts=True, skip_existing=True, samples=8, size=(64, 48), scene='-Shot "2"',
+        view_layer=None, assignments=["use_denoise=0"],
+    )  # fmt: skip
+    text = farm.flamenco(options)
+    version = ".".join(map(str, bpy.app.version))
+    assert f'const OF_EVERY_TASK = ["--expect", "{version}", "--run-scripts"];' in text
+    assert (
+        'const OF_RENDERING = ["--skip-existing", "--samples=8", "--size=64x48", "--scene=-Shot \\"2\\"", '
+        '"--set=use_denoise=0"];'
+    ) in text
 
 
 @pytest.mark.parametrize(("split", "tasks"), [(1, 3), (2, 9)])
