@@ -174,7 +174,9 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
     origin = frame.geometry.origin
     lamps = [] if _other_light(frame) else frame.emitters
     most = _most(frame, before)
-    rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved)), (len(lamps), float(not lamps), most, 0.0)]
+    sharp = float(any(_outruns_penumbra(*pair) for pair in before.lamps))
+    counts = (len(lamps), float(not lamps), most, sharp)
+    rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved)), counts]
     meshes = frame.snapshot.meshes
     for one in frame.snapshot.instances:
         if one.key not in before.moved:
@@ -204,11 +206,26 @@ def _most(frame: Frame, before: Before) -> float:
     return min(LAMPS, LAG * light / max(change, 1e-30))
 
 
+def _outruns_penumbra(old: Light, new: Light) -> bool:
+    """Whether a lamp moves by more than its own width while history counts: its shadows then leave others behind."""
+    if new.kind == "SUN":
+        turned = np.linalg.norm(_ahead(new) - _ahead(old))
+        return bool(LAMPS * turned > new.angle)
+    scales = np.linalg.norm(new.matrix[:3, :2], axis=0)
+    width = min(scales * new.size) if new.kind == "AREA" else 2.0 * new.radius
+    return bool(LAMPS * np.linalg.norm(new.matrix[:3, 3] - old.matrix[:3, 3]) > width)
+
+
+def _ahead(lamp: Light) -> np.ndarray:
+    """(3,) unit, where a lamp looks."""
+    return -lamp.matrix[:3, 2] / max(np.linalg.norm(lamp.matrix[:3, 2]), 1e-30)
+
+
 def _straight_light(lamp: Light, places: np.ndarray) -> np.ndarray:
     """(N, 3) vectors along which a lamp's light comes to places (N, 3) of the world, as long as it is strong there:
     about W/m2. Cones of spots have soft edges here."""
     strength = float(np.abs(lamp.strength).mean()) or 1.0
-    ahead = -lamp.matrix[:3, 2] / max(np.linalg.norm(lamp.matrix[:3, 2]), 1e-30)
+    ahead = _ahead(lamp)
     if lamp.kind == "SUN":
         return np.broadcast_to(strength * ahead, places.shape)
     way = places - lamp.matrix[:3, 3]

@@ -3,7 +3,8 @@
 // Both without the surface's colour. The picture before is looked up where the camera and the object were then, in four
 // pixels, of which those count that lie on the same surface: on its tangent plane, near the place, facing alike. `before_table`:
 // rows x, y, w of its view; its render origin from this one's, w: objects that have moved; how many lamps, y: 1 where there
-// is other light than theirs, z: pictures that light counts for at most, since lamps have moved; nine texels of each object: from where it is to where it was, and to its box, within -1..1,
+// is other light than theirs, z: pictures that light counts for at most, since lamps have moved, w: 1 where
+// their shadows have moved by more than they are blurred; nine texels of each object: from where it is to where it was, and to its box, within -1..1,
 // now and then; a texel of each lamp: place and reach, or the way to a sun and -1 - tangent of its radius.
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
@@ -214,7 +215,7 @@ void main()
   if (found.weight > 0.0) {
     counts = min(found.counts, (moved > 0) ? vec2(within ? most_moved : most_still, most_moved) : vec2(most_still));
     counts = min(counts, vec2(table(4).z));
-    if (moved > 0 && may_have_changed(position.xyz, shift, moved)) {
+    if (table(4).w > 0.0 || (moved > 0 && may_have_changed(position.xyz, shift, moved))) {
       counts.x = min(counts.x, most_moved);
       vec3 low;
       vec3 high;

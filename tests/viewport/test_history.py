@@ -13,7 +13,7 @@ from addon.gfx import images
 from addon.lighting import probes
 from addon.snapshot import SnapshotCache, camera_of_scene, take
 from addon.snapshot.scene import Light
-from addon.techniques.history import FEW, LAMPS, _between, _into_box, _straight_light
+from addon.techniques.history import FEW, LAMPS, _between, _into_box, _outruns_penumbra, _straight_light
 from addon.ui.properties import settings_of
 from tests.viewport.region import Region
 
@@ -74,6 +74,19 @@ def test_a_lamp_that_moves_keeps_as_much_history_as_it_leaves_light_alike(scene,
     lamp.location.x += 50.0
     frame = drafts()
     assert samples_behind(frame).max() < 1.5
+
+
+def test_a_lamp_outruns_its_penumbra_where_three_steps_are_wider_than_it():
+    there = np.eye(4)
+    there[0, 3] = 0.1
+    lamp = Light("a", "a", "AREA", np.eye(4), np.ones(3), size=(2.0, 0.25))
+    assert _outruns_penumbra(lamp, replace(lamp, matrix=there))
+    assert not _outruns_penumbra(lamp, replace(lamp, matrix=there, size=(2.0, 0.5)))
+    turned = np.eye(4)
+    turned[:3, 2] = np.sin(0.01), 0.0, np.cos(0.01)
+    sun = replace(lamp, kind="SUN", angle=0.009)
+    assert _outruns_penumbra(sun, replace(sun, matrix=turned))
+    assert not _outruns_penumbra(replace(sun, angle=0.1), replace(sun, angle=0.1, matrix=turned))
 
 
 def test_light_of_a_lamp_follows_the_inverse_square():
