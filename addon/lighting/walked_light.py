@@ -10,7 +10,7 @@ pixels on the same side, by the mean over those (subsurface/gather.frag.glsl).
 | cost | per sample |
 |---|---|
 | rays | a pixel: `walks` times about 2 / (1 - albedo)^(1/2) + 2, none longer than 12 free paths |
-| bytes per pixel | 80 while it runs |
+| bytes per pixel | 48 while it runs |
 
 Bias: light where walks leave is even within a point's cell; after 64 steps the rest leaves by diffusion.
 """
@@ -27,7 +27,6 @@ from ..surfaces.hits import Hits
 
 FEW_WALKS = 8  # of a pixel, in a picture of one sample
 NAMES = ("direct", "indirect", "near")
-WALKED = (*NAMES, "wide_direct", "wide_indirect")  # before they are smoothed
 PICTURE = ("surface_position", "surface_normal", "spread_length", "scatter_share", "spread_entry", "scatter_walk")
 WALK = passes.fullscreen_program(
     "subsurface walk",
@@ -42,7 +41,7 @@ WALK = passes.fullscreen_program(
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size")),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
-    outputs=tuple(("VEC4", f"out_{name}") for name in WALKED),
+    outputs=tuple(("VEC4", f"out_{name}") for name in NAMES),
 )  # fmt: skip
 SMOOTH = passes.fullscreen_program(
     "subsurface walks, smooth",
@@ -50,7 +49,7 @@ SMOOTH = passes.fullscreen_program(
     textures=tuple(
         ("RGBA32F", name)
         for name in (
-            *(f"walked_{name}" for name in WALKED), "surface_position", "surface_normal", "scatter_share",
+            *(f"walked_{name}" for name in NAMES), "surface_position", "surface_normal", "scatter_share",
             "spread_length", "scatter_objects",
         )
     ),
@@ -79,7 +78,7 @@ def walk(
         shown["surface.position"], shown["surface.normal"],
         *(shown[f"surface.scatter_{name}"] for name in SCATTER_IMAGES),
     )  # fmt: skip
-    made = [images.pool.take(*size, "RGBA32F") for _ in WALKED]
+    made = [images.pool.take(*size, "RGBA32F") for _ in NAMES]
     passes.fullscreen(
         WALK, images.Target(tuple(made)),
         textures={
@@ -96,7 +95,7 @@ def walk(
     passes.fullscreen(
         SMOOTH, images.Target(tuple(smooth)),
         textures={
-            **{f"walked_{name}": image for name, image in zip(WALKED, made)}, "scatter_objects": points.table,
+            **{f"walked_{name}": image for name, image in zip(NAMES, made)}, "scatter_objects": points.table,
             **{name: image for name, image in zip(PICTURE, picture) if name not in ("spread_entry", "scatter_walk")},
         },
         blocks={"film_view": frame.view_block},

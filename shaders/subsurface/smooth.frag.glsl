@@ -28,63 +28,6 @@ vec3 tap_weight(ivec2 pixel, float object, vec3 position, vec3 normal, vec3 face
   return same * exp(-dot(path, path) * narrower);
 }
 
-struct Mean {
-  vec3 direct;
-  vec3 indirect;
-  vec3 near;
-};
-
-void mean_add(inout Mean sum, inout vec3 whole, ivec2 pixel, vec3 weight, bool from_afar)
-{
-  if (max_component(weight) > 0.0) {
-    if (from_afar) {
-      sum.direct += weight * walked_wide_direct_fetch(pixel).rgb;
-      sum.indirect += weight * walked_wide_indirect_fetch(pixel).rgb;
-    }
-    else {
-      sum.direct += weight * walked_direct_fetch(pixel).rgb;
-      sum.indirect += weight * walked_indirect_fetch(pixel).rgb;
-      sum.near += weight * walked_near_fetch(pixel).rgb;
-    }
-    whole += weight;
-  }
-}
-
-// `wide`: standard deviations, m, per channel.
-Mean mean_around(ivec2 pixel, vec3 wide, vec3 position, vec3 normal, vec3 face, float object, float pixel_size, uvec3 roll,
-                 bool from_afar)
-{
-  float widest = max_component(wide);
-  vec3 narrower = vec3(0.5) / (wide * wide) - vec3(0.5 / (widest * widest));
-  vec3 tangent;
-  vec3 bitangent;
-  orthonormal_basis(face, tangent, bitangent);
-  float turn = to_unit(roll.x) * 2.0 * PI;
-  float shift = to_unit(roll.y);
-  Mean sum;
-  sum.direct = sum.indirect = sum.near = vec3(0.0);
-  vec3 whole = vec3(0.0);
-  mean_add(sum, whole, pixel, vec3(1.0), from_afar);
-  for (int k = 0; k < PAIRS; k++) {
-    float r = widest * sqrt(-2.0 * log(1.0 - 0.97 * (float(k) + shift) / float(PAIRS)));
-    float angle = turn + GOLDEN * float(k);
-    ivec2 other;
-    if (!pixel_seen(position + r * (cos(angle) * tangent + sin(angle) * bitangent), other) || all(equal(other, pixel))) {
-      continue;
-    }
-    ivec2 across = 2 * pixel - other;
-    vec3 weight1 = tap_weight(other, object, position, normal, face, widest + pixel_size, narrower);
-    vec3 weight2 = tap_weight(across, object, position, normal, face, widest + pixel_size, narrower);
-    vec3 both = min(weight1, weight2);
-    mean_add(sum, whole, other, mix(both, weight1, ALONE), from_afar);
-    mean_add(sum, whole, across, mix(both, weight2, ALONE), from_afar);
-  }
-  sum.direct /= whole;
-  sum.indirect /= whole;
-  sum.near /= whole;
-  return sum;
-}
-
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -104,14 +47,45 @@ void main()
   float pixel_size = pixel_width_at(position);
   float range = window_of_walks(object_texel(first_object + OBJECT_TEXELS * (int(object) - 1)), pixel_size);
   vec3 wide = max(narrowness * min(PATHS * spread_length_fetch(pixel).xyz, vec3(WINDOWS * range)), vec3(PIXELS * narrowness * pixel_size));
+  float widest = max_component(wide);
+  vec3 narrower = vec3(0.5) / (wide * wide) - vec3(0.5 / (widest * widest));
+  vec3 tangent;
+  vec3 bitangent;
+  orthonormal_basis(face, tangent, bitangent);
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 233);
-  Mean mean = mean_around(pixel, wide, position, normal, face, object, pixel_size, roll, false);
-  out_direct.rgb = mean.direct;
-  out_indirect.rgb = mean.indirect;
-  out_near.rgb = mean.near;
-  float depth = walked_wide_direct_fetch(pixel).w;
-  vec3 wider = narrowness * wide_deviation(spread_length_fetch(pixel).xyz, unpack_three(spread_length_fetch(pixel).w, 255.0), depth);
-  mean = mean_around(pixel, max(wider, wide), position, normal, face, object, pixel_size, hash3(roll), true);
-  out_direct.rgb += mean.direct;
-  out_indirect.rgb += mean.indirect;
+  float turn = to_unit(roll.x) * 2.0 * PI;
+  float shift = to_unit(roll.y);
+  vec3 direct = out_direct.rgb;
+  vec3 indirect = out_indirect.rgb;
+  vec3 left = near.rgb;
+  vec3 whole = vec3(1.0);
+  for (int k = 0; k < PAIRS; k++) {
+    float r = widest * sqrt(-2.0 * log(1.0 - 0.97 * (float(k) + shift) / float(PAIRS)));
+    float angle = turn + GOLDEN * float(k);
+    ivec2 other;
+    if (!pixel_seen(position + r * (cos(angle) * tangent + sin(angle) * bitangent), other) || all(equal(other, pixel))) {
+      continue;
+    }
+    ivec2 across = 2 * pixel - other;
+    vec3 weight1 = tap_weight(other, object, position, normal, face, widest + pixel_size, narrower);
+    vec3 weight2 = tap_weight(across, object, position, normal, face, widest + pixel_size, narrower);
+    vec3 both = min(weight1, weight2);
+    weight1 = mix(both, weight1, ALONE);
+    weight2 = mix(both, weight2, ALONE);
+    if (max_component(weight1) > 0.0) {
+      direct += weight1 * walked_direct_fetch(other).rgb;
+      indirect += weight1 * walked_indirect_fetch(other).rgb;
+      left += weight1 * walked_near_fetch(other).rgb;
+      whole += weight1;
+    }
+    if (max_component(weight2) > 0.0) {
+      direct += weight2 * walked_direct_fetch(across).rgb;
+      indirect += weight2 * walked_indirect_fetch(across).rgb;
+      left += weight2 * walked_near_fetch(across).rgb;
+      whole += weight2;
+    }
+  }
+  out_direct.rgb = direct / whole;
+  out_indirect.rgb = indirect / whole;
+  out_near.rgb = left / whole;
 }

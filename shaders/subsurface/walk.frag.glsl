@@ -11,17 +11,12 @@
 #include "subsurface/walks.glsl"
 #include "subsurface/walked.glsl"
 
-#define WIDE_FROM 1.5   // deviations of the wide mean: from here on what walks bring begins to be counted for it,
-#define WIDE_WHOLE 2.5  // from here on all of it
-
 // Light of walks so far, per channel, and the weight with which it came.
 struct Walked {
-  vec3 direct;        // from points
+  vec3 direct;    // from points
   vec3 indirect;
-  vec3 wide_direct;   // of these what left far from where it entered, against how far light gets below the surface
-  vec3 wide_indirect;
   vec3 far;
-  vec3 near;          // left where pixels nearby know the light
+  vec3 near;      // left where pixels nearby know the light
 };
 
 Walked walked_so_far;
@@ -30,7 +25,6 @@ vec3 entered_normal;
 float pixels_range;
 float points_spacing;
 float translucent;
-vec3 wide_width;  // m, per channel
 vec4 grid;
 vec4 voxels;
 
@@ -38,8 +32,7 @@ void walk_leaves(vec3 weight, vec3 place, vec3 facing, vec2 u)
 {
   ivec2 shown_at;
   float same = side_of_walk(facing, entered_normal) * (pixel_seen(place, shown_at) ? 1.0 : 0.0);
-  float away = distance(place, entered_at);
-  float near = near_window(away, pixels_range) * same;
+  float near = near_window(distance(place, entered_at), pixels_range) * same;
   walked_so_far.near += weight * near;
   weight *= 1.0 - near;
   walked_so_far.far += weight;
@@ -47,13 +40,8 @@ void walk_leaves(vec3 weight, vec3 place, vec3 facing, vec2 u)
   if (cell >= 0) {
     ivec2 texel = ivec2(cell & (ROW - 1), cell / ROW);
     vec3 entering = weight * min(cell_shapes_fetch(texel).w, translucent);
-    vec3 direct = entering * cell_direct_fetch(texel).rgb;
-    vec3 indirect = entering * cell_indirect_fetch(texel).rgb;
-    vec3 wide = smoothstep(vec3(WIDE_FROM), vec3(WIDE_WHOLE), vec3(away) / wide_width);
-    walked_so_far.direct += (vec3(1.0) - wide) * direct;
-    walked_so_far.indirect += (vec3(1.0) - wide) * indirect;
-    walked_so_far.wide_direct += wide * direct;
-    walked_so_far.wide_indirect += wide * indirect;
+    walked_so_far.direct += entering * cell_direct_fetch(texel).rgb;
+    walked_so_far.indirect += entering * cell_indirect_fetch(texel).rgb;
   }
 }
 
@@ -65,8 +53,6 @@ void main()
   out_direct = vec4(0.0);
   out_indirect = vec4(0.0);
   out_near = vec4(0.0);
-  out_wide_direct = vec4(0.0);
-  out_wide_indirect = vec4(0.0);
   vec4 share = scatter_share_fetch(pixel);
   int method = scatter_method(share.w);
   if (share.w < 4.0 || method == SCATTER_BURLEY) {
@@ -98,8 +84,6 @@ void main()
 
   Below below = below_of(object.w, color, length_m.xyz);
   walked_so_far.direct = walked_so_far.indirect = walked_so_far.far = walked_so_far.near = vec3(0.0);
-  walked_so_far.wide_direct = walked_so_far.wide_indirect = vec3(0.0);
-  wide_width = wide_deviation(length_m.xyz, color, depth);
   entered_at = position;
   entered_normal = normal;
   pixels_range = range;
@@ -121,6 +105,4 @@ void main()
   out_direct = vec4(sum.direct * norm, part);
   out_indirect = vec4(sum.indirect * norm, part);
   out_near = vec4(sum.near * norm, part);
-  out_wide_direct = vec4(sum.wide_direct * norm, depth);
-  out_wide_indirect = vec4(sum.wide_indirect * norm, part);
 }

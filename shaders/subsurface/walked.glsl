@@ -6,7 +6,6 @@
 #define DEEPER 12.0
 #define FINE 0.5
 #define COARSEST 0.1
-#define WIDE 0.4
 
 vec4 object_texel(int index)
 {
@@ -60,12 +59,4 @@ float walked_part(Profile profile, vec4 object, float width, float depth)
 float side_of_walk(vec3 facing, vec3 entered)
 {
   return smoothstep(0.4, 0.9, dot(facing, entered));
-}
-
-// Over how far the mean is taken of what walks bring from afar, m, per channel: light that has gone through a body changes over
-// the length by which diffusion dies out, at most about the body's depth.
-vec3 wide_deviation(vec3 free_path, vec3 color, float depth)
-{
-  vec3 dies_out = max(free_path, vec3(LEAST_SCALE)) / clamp(1.7320508 * walk_absorption(color), vec3(1e-3), vec3(1.0));
-  return WIDE * min(dies_out, vec3(depth));
 }
