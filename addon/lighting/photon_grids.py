@@ -22,7 +22,7 @@ from ..sources import lights
 PER_PIXEL = 2.0
 NEARER = 2.0  # diagonals of a box by which its caustic may lie nearer to the camera
 FEWEST_SIDE = 64
-FAINTEST = 0.4  # of the side that the brightest has
+FAINTEST = 0.5  # of the side that the brightest has: that one may be hidden where the faint one shines
 
 
 def sides(frame: Frame, sources: Sequence, boxes: Sequence, side: int) -> np.ndarray:

@@ -761,8 +761,8 @@ def test_grids_are_as_fine_as_pixels_can_show(away, width):
 
 
 def test_grids_have_photons_by_the_third_root_of_what_they_carry():
-    found = grids(0.0, 1000, [80.0, 10.0, 0.001])[:, 0]
-    assert tuple(found) == (160, 80, 64)
+    found = grids(0.0, 1000, [80.0, 20.0, 0.001])[:, 0]
+    assert tuple(found) == (160, 101, 80)
     assert tuple(grids(0.0, 1000, [80.0, np.nan, np.inf])[:, 0]) == (160, 160, 160)
 
 
