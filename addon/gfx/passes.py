@@ -63,7 +63,7 @@ def fullscreen(
 
 
 # Two, of which one has not been drawn last, whatever happened in between.
-_LAST = tuple(
+LAST_DRAWN = tuple(
     fullscreen_program(
         f"last drawn {k}", "generated/main", outputs=(("VEC4", "out_color"),),
         snippets=(("generated/main", f"void main() {{ out_color = vec4({k}.0); }}"),),
@@ -80,7 +80,7 @@ def _let_go() -> None:
     if gpu.platform.backend_type_get() != "OPENGL":
         return
     if not _last:
-        _last.extend(Shader(program) for program in _LAST)
+        _last.extend(Shader(program) for program in LAST_DRAWN)
     with borrowed(1, 1, "RGBA32F") as target:
         for shader in _last:
             with _state(target):

@@ -10,7 +10,7 @@ import pytest
 
 from addon import engine
 from addon.frame.ledger import RAN, REUSED, SKIPPED
-from addon.gfx import images, library
+from addon.gfx import images, library, passes
 from addon.techniques import REGISTRY, make_registry
 
 ALWAYS = {"surfaces", "film"}  # depth, normals and the picture itself are wanted of every scene
@@ -209,12 +209,13 @@ def room(stage):
 
 @pytest.fixture
 def bound(monkeypatch):
-    """Names of the programs that are bound, in order."""
+    """Names of the programs that are bound, in order, but for those that are drawn where a context is left."""
     names = []
     bind = library.Shader.bind
 
     def told(shader, *arguments, **keywords):
-        names.append(shader.program.name)
+        if shader.program not in passes.LAST_DRAWN:
+            names.append(shader.program.name)
         bind(shader, *arguments, **keywords)
 
     monkeypatch.setattr(library.Shader, "bind", told)
