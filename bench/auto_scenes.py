@@ -1,4 +1,7 @@
-"""Twenty-five scenes on which what Auto takes is checked (`bench/auto.py`): none is a sample, none decided a rule.
+"""Twenty-five scenes on which Auto's choices are checked (`bench/auto.py`). None is a sample scene of the project.
+
+One constant of Auto's weighing, the film's error at outlines (FILM in `addon/lighting/shadow_costs.py`), was fitted to
+the mean of fifteen of them, so that these do not test it independently.
 
 Twelve are rooms, where light arrives by walls, and thirteen stand in the open, where shadows decide. All are made of
 numbers.
