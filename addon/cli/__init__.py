@@ -135,7 +135,9 @@ def _parser(program: str) -> argparse.ArgumentParser:
     job.add_argument("--results", metavar="FOLDER", type=Path, help="for the pictures (default: in the job's folder)")
     job.add_argument("--format", choices=("png", "exr"), default="exr", help="of the pictures (default exr)")
     job.add_argument("--extensions", metavar="FOLDER", help="shared folder of extensions that nodes find Candela in")
-    job.add_argument("--skip-existing", action="store_true", help="a task that is tried again keeps what it finished")
+    job.add_argument(
+        "--skip-existing", action="store_true", help="tasks leave pictures and slices that are there, older ones too"
+    )
     job.add_argument("--gpu", action="store_true", help="ask for nodes with a GPU")
     job.set_defaults(verb=farm.write_job, opens=True)
     against = commands.add_parser("compare", help="render by Candela and by Cycles, and compare", **add)

@@ -1,5 +1,5 @@
 // A job type of Flamenco 3 for Candela: chunks of frames, slices of samples, and what puts the slices together.
-// It stands in the folder `scripts` beside the manager. Nodes need Blender with Candela, and a shared folder of files.
+// It holds for the job that it was written for. It stands in the folder `scripts` beside the manager. Nodes need Blender with Candela, and a shared folder of files.
 
 // What the job that this file was written for asks of every task, and of those that render: `farm` puts it here.
 const OF_EVERY_TASK = [];

@@ -3,7 +3,7 @@
     template.json           Open Job Description, jobtemplate-2023-09: what Deadline Cloud and `openjd` run
     parameter_values.json   the values that the template's parameters have for this file
     asset_references.json   the files that a node needs, and the folder that it writes
-    candela.js              a job type of Flamenco, for its manager's folder of scripts
+    candela_NAME.js         a job type of Flamenco for this file, for its manager's folder of scripts
 
 Steps: Render has a task for each chunk of frames and slice of samples; Assemble, where samples are split, merges each
 chunk's slices when all of Render is done. A task is a call of the command line: it opens the file once, compiles once,
@@ -69,7 +69,7 @@ def write_job(job: Job) -> None:
             ("asset_references.json", {"assetReferences": references}),
         ):
             (place / file).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        (place / "candela.js").write_text(flamenco(options), encoding="utf-8")
+        (place / f"candela_{name}.js").write_text(flamenco(name, options), encoding="utf-8")
     tasks = len(parts) * options.split_samples
     print(
         f"{len(frames)} frames in {len(parts)} chunks, {options.split_samples} slices of each: {tasks} tasks of Render"
@@ -114,9 +114,9 @@ def of_rendering(options) -> list[str]:
     return chosen
 
 
-def flamenco(options) -> str:
-    """The text of the job type of Flamenco, with what this job asks of its tasks."""
-    text = FLAMENCO.read_text(encoding="utf-8")
+def flamenco(name: str, options) -> str:
+    """The text of the job type of Flamenco for the file of this name, with what the job asks of its tasks."""
+    text = FLAMENCO.read_text(encoding="utf-8").replace('label: "Candela"', f"label: {json.dumps(f'Candela: {name}')}")
     for name, arguments in (("OF_EVERY_TASK", of_every_task(options)), ("OF_RENDERING", of_rendering(options))):
         text = text.replace(f"const {name} = [];", f"const {name} = {json.dumps(arguments)};")
     return text

@@ -149,7 +149,7 @@ def render(job: Job) -> None:
         there = [one for one in paths.values() if one.exists()]
         paths = {frame: one for frame, one in paths.items() if one not in there}
         if there:
-            print(f"{len(there)} pictures are there already and are left as they are.")
+            print(f"{'1 picture is' if len(there) == 1 else f'{len(there)} pictures are'} there already: left as is.")
     for place, (frame, one) in enumerate(paths.items()):
         if frame != scene.frame_current:
             with quiet(options.verbose):

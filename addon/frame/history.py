@@ -78,8 +78,12 @@ def seeded(settings: Settings, before: Before | None) -> Settings:
 
 def lamps_moved(before: Snapshot, now: Snapshot) -> tuple[tuple[Light, Light], ...]:
     """Lamps of equal keys, then and now, that stand elsewhere. Both snapshots have the same ones in the same order."""
+
+    def place(one: Light) -> np.ndarray:
+        return one.matrix[:3, :3] if one.kind == "SUN" else one.matrix
+
     pairs = zip(before.lights, now.lights)
-    return tuple((old, new) for old, new in pairs if old is not new and not np.array_equal(old.matrix, new.matrix))
+    return tuple((old, new) for old, new in pairs if old is not new and not np.array_equal(place(old), place(new)))
 
 
 _COMPARED: tuple[Callable, ...] = tuple(

@@ -50,8 +50,8 @@ def _kept_inside(plan: Plan, settings: Settings, used: Iterable[CompiledMaterial
         return
     for one in used:
         if one.glass is not None and one.glass.share > 0.0 and one.glass.ior >= GEM:
-            inside = f"its index of {one.glass.ior:.2f} mirrors light inside more often than the {followed} Interfaces"
-            text = f"{inside} of {rays.label} follow, and it looks too dark: raise them to 32."
+            inside = f"with an index of refraction of {one.glass.ior:.2f} it reflects light inside more often than"
+            text = f"{inside} {rays.label} follows ({followed} Interfaces), so it looks too dark: set Interfaces to 32."
             yield Note(f"Material '{one.name}'", text, one.name)
 
 

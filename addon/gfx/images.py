@@ -200,8 +200,10 @@ def lasting_context():
     try:
         yield
     finally:
-        context.leave()
-        _thread.framebuffers = before
+        try:
+            context.leave()
+        finally:
+            _thread.framebuffers = before
 
 
 def _framebuffers() -> _Framebuffers:
@@ -226,8 +228,10 @@ def passing_context():
     try:
         yield
     finally:
-        context.leave()
-        _thread.framebuffers = before
+        try:
+            context.leave()
+        finally:
+            _thread.framebuffers = before
 
 
 @dataclass(eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 
 from .context import on_leave, on_release, overtakes_draws
 from .geometry import Batch, vertex_buffer
-from .images import Image, Target, borrowed, finish
+from .images import Image, Target, borrowed, finish, lasts
 from .library import FULLSCREEN_VERTEX, MOST_TEXTURES, Program, Shader, get
 
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
@@ -75,17 +75,19 @@ _last: list[Shader] = []
 
 @on_leave
 def _let_go() -> None:
-    """Draw programs that are never freed. OpenGL's contexts hold the one that they drew last until they draw another:
-    freed meanwhile elsewhere it would end here, which is one more context than may free it (see library.py)."""
+    """Draw programs that stay until all are released. OpenGL's contexts hold the one that they drew last until they
+    draw another: freed meanwhile elsewhere it would end here, in a context that may not free it (see library.py)."""
     if gpu.platform.backend_type_get() != "OPENGL":
         return
     if not _last:
         _last.extend(Shader(program) for program in LAST_DRAWN)
     with borrowed(1, 1, "RGBA32F") as target:
         for shader in _last:
+            shader.kept.lasts = shader.kept.lasts or lasts()
             with _state(target):
                 shader.bind()
                 _fullscreen_batch().draw(shader.handle)
+    gpu.shader.unbind()
 
 
 @contextmanager

@@ -89,7 +89,7 @@ class ScatterPoints:
         maps = [maps_of(material.graph) for material in snapshot.materials]
         painted = [(k, *one, snapshot.images[one[1]].version) for k, found in enumerate(maps) for one in found.items()]
         moved = [
-            (k, one.mesh, snapshot.meshes[one.mesh].version, one.matrix.tobytes(), one.materials)
+            (k, one.mesh, snapshot.meshes[one.mesh].version, one.matrix.tobytes(), one.materials, one.terminator > 0.0)
             for k, one in ((k, placed[k]) for k in shown)
         ]
         origin = tuple(frame.geometry.origin)

@@ -317,8 +317,8 @@ def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
     if _is_linked(owner):
         said.append(
             "light linking counts for light that reaches surfaces straight or from virtual lights, for what mirrors "
-            "and glass show, and for whether a lamp shines into volumes and throws caustics; other bounced light, and "
-            "shadow linking in volumes, mirrors and caustics follow none."
+            "and glass show, and for whether a lamp shines into volumes and throws caustics; other bounced light does "
+            "not follow it, and volumes, mirrors and caustics do not follow shadow linking."
         )
     if kind in _DRAWN and owner.is_shadow_catcher and not final:
         said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")

@@ -12,8 +12,9 @@ history: its light is the fresh one. Indirect light is filtered over neighbours 
 joined, not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. While objects move n is
 at most FEW, for light straight from lamps only where a moving object's box stands or stood before one of them; there it
 is kept within the spread of what is fresh on 5x5 pixels, so that shadows move along. (Everywhere, where the world or
-meshes shine.) After any other edit there is no history at all (frame/history.py); what shines is never carried: it
-moves otherwise than its surface.
+meshes shine.) While lamps move n is at most LAMPS, and less where a step changes more than LAG / LAMPS of their light.
+After any other edit (and while lamps of node trees move) there is no history at all (frame/history.py); what shines
+is never carried: it moves otherwise than its surface.
 
 In drafts of the viewport, and, where `animation` says so, in final pictures of one sample drawn one after the other
 by one process; a picture then depends on those before it. Never in slices, with motion blur or where samples may end
@@ -24,9 +25,9 @@ early: all machines would need the same past.
 | pass | 16 + 4 fetches of history per pixel; while objects move 12 for each of them and lamp, 50 in their shadows |
 | images | 4 RGBA32F of the picture's size, kept |
 
-Bias: light that changes as things move lags by up to FEW pictures; sharp shadows of moved cameras are looked up
-between pixels. Bounded by the tests above. Sources: Nehab et al. 2007 (reverse reprojection); Schied et al. 2017
-(SVGF: light without colour, tests of surfaces); Salvi 2016 (bounds by the spread of neighbours).
+Bias: light that changes as things move lags by up to FEW pictures, of lamps that move by LAMPS; sharp shadows of
+moved cameras are looked up between pixels. Bounded by the tests above. Sources: Nehab et al. 2007 (reprojection);
+Schied et al. 2017 (SVGF: light without colour, tests of surfaces); Salvi 2016 (bounds by the spread of neighbours).
 """
 
 from __future__ import annotations
@@ -174,7 +175,8 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
     origin = frame.geometry.origin
     lamps = [] if _other_light(frame) else frame.emitters
     most = _most(frame, before)
-    sharp = float(any(_outruns_penumbra(*pair) for pair in before.lamps))
+    # Where objects move, too, what they hid from a lamp's former place is not looked up.
+    sharp = float(bool(before.lamps and before.moved) or any(_outruns_penumbra(*pair) for pair in before.lamps))
     counts = (len(lamps), float(not lamps), most, sharp)
     rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved)), counts]
     meshes = frame.snapshot.meshes
@@ -225,6 +227,8 @@ def _straight_light(lamp: Light, places: np.ndarray) -> np.ndarray:
     """(N, 3) vectors along which a lamp's light comes to places (N, 3) of the world, as long as it is strong there:
     about W/m2. Cones of spots have soft edges here."""
     strength = float(np.abs(lamp.strength).mean()) or 1.0
+    if lamp.kind == "AREA" and not lamp.normalize:
+        strength *= float(np.linalg.norm(np.cross(*lamp.matrix[:3, :2].T)))
     ahead = _ahead(lamp)
     if lamp.kind == "SUN":
         return np.broadcast_to(strength * ahead, places.shape)

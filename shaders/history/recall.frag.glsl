@@ -1,11 +1,14 @@
 // Light of the picture before, where that shows the same surface: joined with the fresh light of this sample.
 //
 // Both without the surface's colour. The picture before is looked up where the camera and the object were then, in four
-// pixels, of which those count that lie on the same surface: on its tangent plane, near the place, facing alike. `before_table`:
-// rows x, y, w of its view; its render origin from this one's, w: objects that have moved; how many lamps, y: 1 where there
-// is other light than theirs, z: pictures that light counts for at most, since lamps have moved, w: 1 where
-// their shadows have moved by more than they are blurred; nine texels of each object: from where it is to where it was, and to its box, within -1..1,
-// now and then; a texel of each lamp: place and reach, or the way to a sun and -1 - tangent of its radius.
+// pixels, of which those count that lie on the same surface: on its tangent plane, near the place, facing alike.
+// Texels of `before_table`:
+//   3  rows x, y, w of its view
+//   1  its render origin from this one's; w: how many objects have moved
+//   1  how many lamps; y: 1 where there is other light than theirs; z: pictures that light counts for at most, since
+//      lamps have moved; w: 1 where their shadows may have moved by more than they are blurred
+//   9  of each object: from where it is to where it was, and to its box, within -1..1, now and then
+//   1  of each lamp: place and reach, or the way to a sun and -1 - tangent of its radius
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 

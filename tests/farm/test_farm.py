@@ -198,7 +198,7 @@ def test_pictures_that_are_there_are_left_if_asked(moving, tmp_path):
                    "--output", "m_####.png", folder=tmp_path)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert there.read_bytes() == b"finished before" and (tmp_path / "m_0003.png").stat().st_size > 100
-    assert "1 pictures are there already" in done.stdout
+    assert "1 picture is there already" in done.stdout
 
 
 @pytest.mark.slow
@@ -225,7 +225,7 @@ def test_a_bundle_is_a_job_by_openjds_own_judgement(moving, tmp_path):
     pytest.importorskip("openjd.model")
     template = job(tmp_path / "job", moving, "--frames", "1-6", "--chunk", "4", "--split-samples", "2", "--gpu")
     assert sorted(path.name for path in (tmp_path / "job").iterdir()) == [
-        "asset_references.json", "candela.js", "parameter_values.json", "template.json",
+        "asset_references.json", "candela_moving.js", "parameter_values.json", "template.json",
     ]  # fmt: skip
     checked = subprocess.run(
         [sys.executable, "-m", "openjd", "check", str(tmp_path / "job" / "template.json")], check=False,
@@ -426,7 +426,8 @@ def test_the_job_type_of_flamenco_asks_what_its_job_was_asked():
         split_samples=2, run_scripts=True, skip_existing=True, samples=8, size=(64, 48), scene='-Shot "2"',
         view_layer=None, assignments=["use_denoise=0"],
     )  # fmt: skip
-    text = farm.flamenco(options)
+    text = farm.flamenco("shot", options)
+    assert 'label: "Candela: shot"' in text
     version = ".".join(map(str, bpy.app.version))
     assert f'const OF_EVERY_TASK = ["--expect", "{version}", "--run-scripts"];' in text
     assert (

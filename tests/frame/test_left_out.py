@@ -109,5 +109,5 @@ def test_gems_that_mirror_more_often_than_is_followed_are_named(monkeypatch):
     plan = Plan((SimpleNamespace(name="traced_refraction", label="Refraction"),), (), {})
     few, enough = (SimpleNamespace(bounces=0, get=lambda technique, name, n=n: n) for n in (8, 32))
     (note,) = left_out.notes_of(plan, scene, few, materials)
-    assert note.subject == "Material 'Diamond'" and "2.42" in note.text and "8 Interfaces" in note.text
+    assert note.subject == "Material 'Diamond'" and "2.42" in note.text and "(8 Interfaces)" in note.text
     assert left_out.notes_of(plan, scene, enough, materials) == ()

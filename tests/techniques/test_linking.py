@@ -185,7 +185,7 @@ def test_more_groups_than_there_are_bits_are_named(room):
 
 def test_what_is_not_followed_is_said(room):
     lit_alone(room, room.lamp)
-    assert any("follow none" in note.text for note in snapshot_of(room).notes)
+    assert any("caustics do not follow shadow linking" in note.text for note in snapshot_of(room).notes)
 
 
 def test_an_instance_is_linked_as_its_parent_is_before_itself():
