@@ -81,6 +81,7 @@ class Casters:
     lights: frozenset[str]  # keys of the lights that are answered for
     bent: frozenset[str]  # of those whose refracted light is wanted, too
     spreads: bool = False  # nothing here makes light converge
+    dark: frozenset[str] = frozenset()  # keys of lamps that, by light linking, light no caster
 
     @property
     def materials(self) -> frozenset[int]:
@@ -128,9 +129,9 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     bent = frozenset(light.key for light in given if light.caustics) if by_flags else keys
     # Light that a lamp does not send to any caster throws none, and glass still stops it.
     receivers = {one.links.receiver for one in shown}
-    bent -= {light.key for light in given if receivers <= set(light.links.unlit)}
+    dark = frozenset(light.key for light in given if receivers <= set(light.links.unlit))
     spreads = not glass and _only_spread(snapshot, shown, mirrors, given, boxes)
-    return Casters(frozenset(glass), mirrors, low, high, keys, bent, spreads)
+    return Casters(frozenset(glass), mirrors, low, high, keys, bent, spreads, dark)
 
 
 def _other_sources(snapshot: Snapshot, glass: set[int], mirrors: dict[int, float]) -> tuple[str, ...]:

@@ -190,6 +190,8 @@ class CausticMaps:
             frame.count(technique, "passes")
 
         self._pending, self._splat = (light, view, caught["receiver_position"]), splat
+        self._count += 1
+        self.lights.add(caustic_casters.key_of(light.emitter))
         return splat
 
     def _shares(self, light: LitView) -> bool:
@@ -200,7 +202,7 @@ class CausticMaps:
         """Keep the map that was splatted last, if there is one."""
         if self._pending is None:
             return
-        light, view, position = self._pending
+        _, view, position = self._pending
         self._pending = None
         values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
         self._block = _updated(self._block, VIEW, values)
@@ -219,8 +221,6 @@ class CausticMaps:
         frame.count(technique, "passes")
         kept.views.append(values)
         kept.block = None
-        self._count += 1
-        self.lights.add(caustic_casters.key_of(light.emitter))
 
     def ready(self, frame: Frame) -> list[KeptMaps]:
         """`of`, with the blocks that programs bind."""

@@ -127,7 +127,7 @@ class LitView:
     weight: float  # of the point's photons: they stand for the samples that have none
     strata: int = 0  # points of it that share out the choices at inner faces; 0: not known; -1: the likelier way alone
     samples: int = 0  # of the picture, where each half of them shares out its number over half of these points
-    middle: LightView | None = None  # from the light's middle, where that serves the map of all points of a sample
+    middle: LightView | None = None  # from the light's middle, if one map serves all of its points in a sample
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,10 @@ class Photons:
         if fitted and answered and boxes:
             grids = {id(one): row for one, row in zip(answered, photon_grids.sides(frame, answered, boxes, most))}
         for emitter, index, count, weight in self._turns(frame, casters, turn):
-            bends = casters.refracting and caustic_casters.key_of(emitter) in casters.bent
+            key = caustic_casters.key_of(emitter)
+            if key in casters.dark:
+                continue
+            bends = casters.refracting and key in casters.bent
             lobes = ((REFRACTED,) if bends else ()) + reflected
             sharing, of_turns = count, 0
             if turn is not None and count > 1:

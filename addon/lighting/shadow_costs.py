@@ -63,11 +63,10 @@ class Weighed:
     def pixels(self) -> int:
         return self.size[0] * self.size[1]
 
-    def points(self, key: str, each: Compared, rays: bool) -> Foreseen:
-        """`each`: a ray of each pixel beside maps; `rays`: whether those can be traced."""
+    def points(self, key: str, each: Compared) -> Foreseen:
+        """`each`: a ray of each pixel beside maps."""
         count = self.rates.of_points[key].per_sample
-        least = min(each.rays, each.maps) if rays else each.maps
-        return self._foreseen(key, self._left(key), count * least)
+        return self._foreseen(key, self._left(key), count * min(each.rays, each.maps))
 
     def edges(self, key: str, before_pixel: float, triangles: int) -> Foreseen:
         left = SHARED * self.rates.variance[key] * EDGE_POINTS**-1.5

@@ -205,14 +205,16 @@ def _most(frame: Frame, before: Before) -> float:
     moved = [(_straight_light(old, places), _straight_light(new, places)) for old, new in before.lamps]
     change = sum(np.linalg.norm(now - then, axis=1).mean() for then, now in moved)
     light = sum(max(np.linalg.norm(one, axis=1).mean() for one in pair) for pair in moved)
-    return min(LAMPS, LAG * light / max(change, 1e-30))
+    return min(LAMPS, LAG * light / change) if change > 0.0 else float(MANY)
 
 
 def _outruns_penumbra(old: Light, new: Light) -> bool:
     """Whether a lamp moves by more than its own width while history counts: its shadows then leave others behind."""
+    turned = np.linalg.norm(_ahead(new) - _ahead(old))
     if new.kind == "SUN":
-        turned = np.linalg.norm(_ahead(new) - _ahead(old))
         return bool(LAMPS * turned > new.angle)
+    if new.kind == "SPOT" and LAMPS * turned > max(new.spot_blend, 0.02) * new.spot_angle:
+        return True
     scales = np.linalg.norm(new.matrix[:3, :2], axis=0)
     width = min(scales * new.size) if new.kind == "AREA" else 2.0 * new.radius
     return bool(LAMPS * np.linalg.norm(new.matrix[:3, 3] - old.matrix[:3, 3]) > width)

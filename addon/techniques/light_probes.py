@@ -197,7 +197,11 @@ class LightProbes(Technique):
         rates, of_points = (dict(zip(distinct, one)) for one in by_place)
         into.by_light = {key: rates[place] for key, place in zip(keys, places)}
         into.of_points = {key: of_points[place] for key, place in zip(keys, places)}
-        into.variance = {key: float(joint[distinct.index(place)]) for key, place in zip(keys, places)}
+        # That of a place is shared by its lamps.
+        known = np.nan_to_num(np.array(joint, float), nan=0.0, posinf=1e30)
+        into.variance = {
+            key: float(known[distinct.index(place)]) / places.count(place) for key, place in zip(keys, places)
+        }
         frame.count(self, "probing rays", (len(moments) - (seen is not None)) * moments.shape[1] * asked_points)
 
     def _rates(self, frame: Frame, lit: bool, joint: list, film: list, points: bool) -> list[Rate]:

@@ -223,10 +223,9 @@ class ShadowsByLight(PointMaps):
         views = plain.views(frame, emitter, emitter.middle(), 0)
         if not views:
             return None
-        traced = not drawn_stochastically(frame)
         each = rays_beside(frame, views, plain.resolution(frame))
         found: dict[str, Foreseen] = {
-            shadow_costs.POINTS: weighed.points(key, each, traced),
+            shadow_costs.POINTS: weighed.points(key, each),
             shadow_costs.MAPS: weighed.maps(key, each, len(views) * self._soft_side(frame) ** 2),
         }
         triangles = frame.geometry.triangles

@@ -5,7 +5,8 @@
 #define PATH_CLEAR 8         // added where all surfaces so far were clear glass that let it pass (Film > Transparent Glass)
 #define PATH_EDITED 16       // added until it leaves a closed object whose edit turns what leaves it
 #define PATH_MIRROR 32       // added for each surface so far that mirrored it
-#define PATH_THROUGH 0.25     // added as long as glass that goes both ways has let it pass; alone: what is met is another way's
+#define PATH_THROUGH 0.25     // added as long as glass that goes both ways has let it pass; alone: another way adds the light
+                              // of what is met
 #define MOST_THROUGH 4       // such surfaces behind the first; as in addon/techniques/shaded_reflections.py
 #define FOUND_ELSEWHERE -1.0 // in place of a ray's density: light samples have all that it finds of emission
 

@@ -2,8 +2,9 @@
 // ONWARD, of what rays have met. `travelled`: how far light samples of the last lobe were from where the ray starts, m.
 //
 // Of smooth glass, one surface behind the other from the camera on, each way is a pass of its own (`way`): 0 goes through
-// all of them, 1 is mirrored by the first, 2 by one of the others, drawn by mirror_depth. So what is seen through panes and
-// bodies of glass is no matter of chance; pictures of many samples go without 2, and leave it to chance. Rays of 2 that come to that one show nothing on their way: 0 has it.
+// all of them, 1 is mirrored by the first, 2 by one of the others, drawn by mirror_depth. On their way to that one, rays of
+// way 2 add no light: way 0 has it. So what few samples see through panes and bodies of glass is no matter of chance;
+// pictures of many samples go without way 2 and leave it to chance.
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
@@ -87,7 +88,8 @@ void main()
     float share = max_component(mirror.glossy_weight) / max(max_component(s.glossy_weight), 1e-6);
     float mirrored_part = (mirrors_of_all > 0.0) ? share * max(mirrors_of_all, LEAST_MIRRORED) : 0.0;
     float chance = mirrored_part / max(mirrored_part + 1.0 - mirrors_of_all, 1e-6);
-    uvec3 roll = roll_of(pixel, 0, film_view.seed, 81 + ray_number);
+    // Not 81 + ray_number: that chooses the lobe of what this ray meets (hits/surface.frag.glsl).
+    uvec3 roll = roll_of(pixel, 0, film_view.seed, 601 + ray_number);
     found_by_rays = shuffled(film_view.sample_index, roll.xy) < chance;
     kept = found_by_rays ? chance : 1.0 - chance;
     s = found_by_rays ? mirror : s;
@@ -99,6 +101,11 @@ void main()
   vec3 weight = vec3(0.0);
   vec3 direction = vec3(0.0);
   float density = 0.0;
+#ifdef ONWARD
+  bool mirrored_on = lobe_goes_on(s);
+#else
+  bool mirrored_on = s.glossy_roughness <= shaded_roughness;  // rougher ones are gathered (indirect/gather.frag.glsl)
+#endif
   bool enters = false;  // whether an edit sends what leaves a solid into it again
   if (s.kind == LOBE_REFRACTION && ray_number <= interfaces) {
     Interface surface = interface_begin(s.glossy_normal, viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
@@ -125,7 +132,7 @@ void main()
 #endif
     code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0) + (edited ? PATH_EDITED : 0);
   }
-  else if (s.kind <= FRESNEL_F82 && lobe_goes_on(s) && mirrored < mirrors) {
+  else if (s.kind <= FRESNEL_F82 && mirrored_on && mirrored < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);
     direction = lobe_sample(lobe, u, weight);
     lobe_reflection(lobe, direction, density);

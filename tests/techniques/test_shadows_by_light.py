@@ -185,7 +185,7 @@ def test_error_times_time_decides(side, variance, best):
     rates = LightRates(variance={"lamp": variance}, of_points={"lamp": Rate(0)})
     weighed = shadow_costs.Weighed((side, side), rates)
     each = Compared(rays=1e3 * side, maps=1e6)
-    found = {"points": weighed.points("lamp", each, True), "maps": weighed.maps("lamp", each, 2.0**18)}
+    found = {"points": weighed.points("lamp", each), "maps": weighed.maps("lamp", each, 2.0**18)}
     assert min(found, key=lambda name: found[name].product) == best
     assert weighed.edges("lamp", 0.0, 0).error < found["maps"].error < found["points"].error
     device.use(None)
