@@ -120,7 +120,11 @@ def test_bad_usage_is_refused_before_the_file_is_opened(arguments, words, tmp_pa
     ("options", "words"),
     [
         (("--samples", "0"), ["samples", "at least 1"]),
-        (("--set", "direct_light.nonsense=1"), ["direct_light.nonsense", "Known settings"]),
+        (
+            ("--set", "direct_light.nonsense=1"),
+            ["direct_light.nonsense", "Known settings", "use_denoise; slot.shadow, "],
+        ),
+        (("--set", "use_denoise=maybe"), ["'use_denoise' needs", "maybe"]),
         (("--set", "samples"), ["name=value"]),
         (("--set", "relief.steps=300"), ["relief.steps", "material"]),
         (("--scene", "Nowhere"), ["Nowhere", "Cornell Box"]),

@@ -21,6 +21,7 @@ from ..frame import device_probe
 from ..frame import ledger as ledgers
 from ..frame.plan import PlanError, make_plan
 from ..frame.settings import SCENE_PARAMS
+from ..frame.technique import Param
 from ..gfx import context
 from ..gfx.device import Device
 from ..lighting.visibility import foreseen
@@ -34,6 +35,8 @@ from .files import output, placed_in, refuse_blend
 from .intermediate import write_intermediate
 from .refused import USAGE, Refused, reason
 from .terminal import STDOUT, progress, quiet
+
+DENOISE = Param("use_denoise", "Denoise", True, "")  # of the scene's panel: a technique's strength in settings
 
 # ------------------------------------------------------------------------------------------------------ the open file
 
@@ -122,8 +125,11 @@ def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None
         given.append(f"samples={options.samples}")
         for layer in scene.view_layers:
             layer.samples = 0  # its own number of samples would count
-    settings = replace(settings_of(scene, viewport=False), values={}).override(REGISTRY, given)
     group = scene.candela
+    for text in [text for text in given if text.startswith(f"{DENOISE.name}=")]:
+        group.use_denoise = DENOISE.check(text.partition("=")[2])
+        given.remove(text)
+    settings = replace(settings_of(scene, viewport=False), values={}).override(REGISTRY, given, (DENOISE.name,))
     for param in SCENE_PARAMS:
         setattr(group, param.name, getattr(settings, param.name))
     for slot, technique in settings.slots.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 
 from .schedule import AT_REST, Schedule
 from .technique import OF_A_PICTURE, Param, Technique
@@ -111,9 +112,11 @@ class Settings:
         """All of a technique's values, for its key."""
         return tuple(self.get(technique, param.name) for param in technique.params)
 
-    def override(self, techniques: Iterable[Technique], assignments: Iterable[str]) -> Settings:
+    def override(
+        self, techniques: Iterable[Technique], assignments: Iterable[str], others: Iterable[str] = ()
+    ) -> Settings:
         """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown, or
-        of what a picture has many of."""
+        of what a picture has many of. `others`: what else may be set, by whoever calls."""
         settings = self
         techniques = list(techniques)
         own = {param.name: param for param in SCENE_PARAMS}
@@ -145,10 +148,11 @@ class Settings:
                     f"'{name}' is a setting of each {kind}, not of the picture: set it on the {kind} in the file."
                 )
             else:
-                known = [*own, *slots, *table]
+                known = [*own, *others, *slots, *table]
                 near = difflib.get_close_matches(name.replace("_", ".", 1), known, 3) or difflib.get_close_matches(
                     name, [one.rpartition(".")[2] for one in known], 3
                 )
                 meant = f" Did you mean {' or '.join(near)}?" if near else ""
-                raise ValueError(f"There is no setting '{name}'.{meant} Known settings: {', '.join(known)}.")
+                groups = [", ".join(group) for _, group in groupby(known, lambda one: one.rpartition(".")[0])]
+                raise ValueError(f"There is no setting '{name}'.{meant} Known settings: {'; '.join(groups)}.")
         return settings
