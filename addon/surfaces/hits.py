@@ -68,6 +68,7 @@ MOST_UNFLAGGED = 12  # programs that are drawn over the screen without a flag fo
 MOST_MATERIALS = 8000  # that depth tells apart, see trace.frag.glsl
 ROW = 256  # of lists by material
 MET_ROWS = -(-MOST_MATERIALS // ROW)
+SMOOTH_BOTH, FROSTED_WITHIN = 1, 2  # glass that is kept as one lobe of both ways
 LEADER_BITS = 13  # of numbers that hold two, as in hits/shared.glsl
 RECORDS = ("place", "triangle", "normals", "passed")
 RECORD_TEXTURES = tuple(("RGBA32F", f"hit_{name}") for name in RECORDS[:3])
@@ -340,13 +341,13 @@ class Hits:
     def shading(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
         closures: images.Target, number: int = 0, masked: bool = False, path: images.Image | None = None,
-        both_ways: bool = False,
+        both_ways: int = 0,
     ) -> Iterator[None]:  # fmt: skip
         """Evaluate these materials at the records into `closures` (take_closures), which is cleared before; `masked`:
         of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0;
-        `path`: what the rays' paths let pass (rgb), by which lobes are chosen; `both_ways`: smooth glass is one lobe,
-        as goes_both_ways has it. In parts: after each program that draws for the first time, which takes the driver
-        long."""
+        `path`: what the rays' paths let pass (rgb), by which lobes are chosen; `both_ways`: which glass is one lobe,
+        SMOOTH_BOTH (as goes_both_ways has it) and FROSTED_WITHIN added up. In parts: after each program that draws for
+        the first time, which takes the driver long."""
         images.Target(closures.colors[:1] if masked else closures.colors).clear()
         leaders = {frame.materials.leaders[k] for k in materials}
         # One program after the other: between materials that share one, only what differs is bound.
@@ -368,7 +369,7 @@ class Hits:
 
     def _draw(
         self, frame: Frame, ray_direction: images.Image, path: images.Image | None, records: Records, order: list[int],
-        closures: images.Target, number: int, both_ways: bool,
+        closures: images.Target, number: int, both_ways: int,
     ) -> None:  # fmt: skip
         """Evaluate materials, by their leaders, in this order."""
         if not order:
@@ -399,7 +400,7 @@ class Hits:
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))
 
-    def _own_bindings(self, frame: Frame, material: int, number: int, both_ways: bool) -> tuple[Program, dict]:
+    def _own_bindings(self, frame: Frame, material: int, number: int, both_ways: int) -> tuple[Program, dict]:
         """The program of a material, and what it binds besides records, rays, instances and the view."""
         compiled = frame.materials.compiled[material]
         constants: dict[str, object] = {"material_depth": depth_of(material), "material_number": material}

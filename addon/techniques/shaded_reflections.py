@@ -70,7 +70,16 @@ from ..surfaces.draw import (
     surface_bindings,
 )
 from ..surfaces.edits_at_hits import EditsAtHits
-from ..surfaces.hits import ANY_RAY, MET, Hits, Records, closure_bindings, take_closures
+from ..surfaces.hits import (
+    ANY_RAY,
+    FROSTED_WITHIN,
+    MET,
+    SMOOTH_BOTH,
+    Hits,
+    Records,
+    closure_bindings,
+    take_closures,
+)
 from .environment_light import directions_rate
 from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
@@ -306,6 +315,7 @@ class ShadedReflections(Technique, BothWays):
         onward_roughness = min(reach["shaded_roughness"], ONWARD_ROUGHNESS)
 
         edits = frame.service(EditsAtHits)
+        within = FROSTED_WITHIN * (edits is None)  # edits may turn what is mirrored apart from what is bent
         turned = edits.begin(frame, frame.images["surface.edit"]) if edits is not None else images.Target(())
         rays, onward = self._take(frame), self._take(frame)
         records = Records.take(frame.size)
@@ -321,7 +331,7 @@ class ShadedReflections(Technique, BothWays):
                         yield
                         yield from hits.shading(
                             frame, self, rays.colors[1], records, met, closures, number, masked=True,
-                            path=rays.colors[2], both_ways=behind and number < MOST_THROUGH,
+                            path=rays.colors[2], both_ways=within + SMOOTH_BOTH * (behind and number < MOST_THROUGH),
                         )  # fmt: skip
                         yield
                         if edits is not None:

@@ -41,7 +41,8 @@ vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, flo
     of_lobe = lobe_reflection(r.lobe, direction, lobe_density);
   }
 #ifdef TRANSMISSION
-  if (r.bends && (light.flags & LIGHT_TRANSMISSION) != 0) {
+  // What frosted glass mirrors within is left to rays.
+  if (r.bends && (light.flags & LIGHT_TRANSMISSION) != 0 && dot(direction, r.glass.normal) < 0.0) {
     of_lobe = interface_value(r.glass, direction, lobe_density);
   }
 #endif
@@ -183,8 +184,7 @@ void main()
   r.lobe = lobe_begin(r.surface, r.viewer);
   r.shines = r.shines && !lobe_is_mirror(r.lobe);
 #ifdef TRANSMISSION
-  r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,
-                            r.surface.glossy_tint, r.surface.glossy_edge.x > 0.5, r.surface.glossy_weight, vec3(0.0));
+  r.glass = interface_met(r.surface, r.viewer, r.mirrored < mirrors);
 #endif
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + ray_number);
   // Light from below the surface takes the place of what a diffuse one would send.

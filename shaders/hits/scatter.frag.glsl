@@ -11,6 +11,7 @@
 #include "lib/refraction.glsl"
 #include "trace/origin.glsl"
 #include "hits/path.glsl"
+#define TRANSMISSION  // for interface_met
 #include "hits/onward.glsl"
 
 #define LEAST_MIRRORED 0.05  // as in hits/surface.frag.glsl
@@ -69,11 +70,13 @@ void main()
   bool edited = edits_what_leaves(s);
   bool through = both && way != 1;
 #endif
+  bool frosted = false;
   float kept = 1.0;  // chance of the way that the path takes
   bool found_by_rays = false;  // whether light samples leave out the lobe
 #ifdef ONWARD
   float mirrors_of_all = max_component(fresnel_reflectance(FRESNEL_DIELECTRIC, s.glossy_tint, vec3(1.0), s.glossy_ior, dot(s.glossy_normal, viewer)));
-  bool apart = through && both && ray_number <= MOST_THROUGH && mirrors_of_all < 0.5;
+  frosted = frosted_within(s);
+  bool apart = through && both && !frosted && ray_number <= MOST_THROUGH && mirrors_of_all < 0.5;
   if (way == 2 && through && !apart) {
     return;
   }
@@ -83,7 +86,7 @@ void main()
     found_by_rays = !through;
     s = through ? s : surface_mirrored(s);
   }
-  else if (both && !apart) {
+  else if (both && !apart && !frosted) {
     Surface mirror = surface_mirrored(s);
     float share = max_component(mirror.glossy_weight) / max(max_component(s.glossy_weight), 1e-6);
     float mirrored_part = (mirrors_of_all > 0.0) ? share * max(mirrors_of_all, LEAST_MIRRORED) : 0.0;
@@ -108,11 +111,16 @@ void main()
 #endif
   bool enters = false;  // whether an edit sends what leaves a solid into it again
   if (s.kind == LOBE_REFRACTION && ray_number <= interfaces) {
-    Interface surface = interface_begin(s.glossy_normal, viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
-                                        s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
+    Interface surface = interface_met(s, viewer, frosted && mirrored < mirrors);
     surface = interface_edited(surface, s);
-    direction = interface_sample(surface, u, 1.0, weight);
+    float choice = 1.0;
+#ifdef ONWARD
+    uvec3 roll = roll_of(pixel, 0, film_view.seed, 81 + ray_number);  // of which hits/surface.frag.glsl has drawn nothing
+    choice = frosted ? shuffled(film_view.sample_index, roll.xy) : 1.0;
+#endif
+    direction = interface_sample(surface, u, choice, weight);
     interface_value(surface, direction, density);
+    bool mirrors_it = choice < 1.0 && dot(direction, surface.normal) > 0.0;
 #ifdef ONWARD
     // Samples of lights for the last lobe that mirrored pass glass on straight lines, and share what is behind it; those of
     // the surface that the camera sees are of another number, and its lobe counts as several rays (light/direct.frag.glsl).
@@ -121,7 +129,8 @@ void main()
       out_travelled = met_travelled_fetch(pixel).x + distance(met_origin_fetch(pixel).xyz, s.position);
     }
 #endif
-    weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
+    density = mirrors_it ? 0.0 : density;  // light samples leave that out
+    weight *= ((dot(direction, s.geometric_normal) < 0.0) != mirrors_it || surface_is_edited(s)) ? 1.0 : 0.0;
 #ifdef HAS_CARRIED_EDIT
     if (edited && s.glossy_ior <= 1.0 && dot(direction, surface.normal) < 0.0) {  // what leaves an edited object goes where the edit turns it
       vec4 edit = carried_edit_fetch(pixel);
@@ -130,7 +139,8 @@ void main()
       enters = dot(direction, s.geometric_normal) > 0.0;
     }
 #endif
-    code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0) + (edited ? PATH_EDITED : 0);
+    code += (edited ? PATH_EDITED : 0);
+    code += mirrors_it ? PATH_MIRROR : PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0);
   }
   else if (s.kind <= FRESNEL_F82 && mirrored_on && mirrored < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);
