@@ -20,8 +20,8 @@ which cannot say where a catcher is brighter than before; else the world stands 
 | time | three pictures; other passes are those of `things` |
 | memory | two pictures on the CPU |
 
-Scenes without catchers make one picture, as ever. Slices hold sums of all three (frame/slices.py). Not drawn: catchers
-in the viewport.
+Scenes without catchers make one picture, as ever. Slices hold sums of all three (frame/slices.py). Viewports at rest
+compose the same on the GPU (viewport/catchers.py, shaders/film/catchers.frag.glsl).
 """
 
 from __future__ import annotations

@@ -173,7 +173,7 @@ def walk(
                         group=owner.lightgroup,
                         blurred=_says(owner, parent, "use_motion_blur"),
                         deforms=_says(owner, parent, "use_deform_motion"),
-                        notes=_object_notes(owner, kind, original.name, final),
+                        notes=_object_notes(owner, original.name),
                     )
                     if made != facts:
                         facts = made
@@ -311,7 +311,7 @@ def _is_linked(owner) -> bool:
     return linking is not None and bool(linking.receiver_collection or linking.blocker_collection)
 
 
-def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
+def _object_notes(owner, name: str) -> tuple[Note, ...]:
     """What of the object is not drawn as Cycles draws it."""
     said = []
     if _is_linked(owner):
@@ -320,8 +320,6 @@ def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
             "and glass show, and for whether a lamp shines into volumes and throws caustics; other bounced light does "
             "not follow it, and volumes, mirrors and caustics do not follow shadow linking."
         )
-    if kind in _DRAWN and owner.is_shadow_catcher and not final:
-        said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
     return tuple(Note(f"Object '{name}'", text) for text in said)
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from math import ceil, floor
 
 from .. import techniques
+from ..film import catcher
 from ..frame.bands import Bands
 from ..frame.picture import Frame
 from ..frame.reads import content
@@ -30,6 +31,7 @@ from ..ui.notes import losses
 from ..ui.passes import RenderPass
 from . import one_pass
 from .ahead import Ahead
+from .catchers import LEFT_OUT, Catchers
 from .pace import SCALES, STEP_S, GuidePace, Pace
 
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
@@ -60,6 +62,7 @@ class Beginning:
     placed: bool = False  # geometry and materials are there
     left: int = 0  # programs that it still has to compile, as far as known
     direct: bool = False  # as `only_direct` says: another process compiles the programs of the rest
+    caught: Snapshot | None = None  # the scene, where its shadow catchers are drawn as such
 
 
 class Viewport:
@@ -77,6 +80,7 @@ class Viewport:
         self.bands = Bands()
         self.look, self.guide = FirstLook(), FirstLook()
         self.guides = GuidePace()
+        self.catchers = Catchers()
         self.dirty = True  # the scene may have changed since the snapshot
         self.frame: Frame | None = None
         self.scale = SCALES[-2]
@@ -143,6 +147,8 @@ class Viewport:
             return f"Compiling shaders ({left} remaining)" if left else "Reading the scene"
         if self.frame is None:
             return "Waiting for the GPU"
+        if self.catchers.doing:
+            return self.catchers.doing
         coarse = f", 1/{self.scale} resolution" if self.scale > 1 else ""
         coarse += ", direct light only" if self.direct else ""
         done, of = self.frame.samples_done, self.frame.settings.samples
@@ -157,7 +163,10 @@ class Viewport:
         """That the picture has lost something, for the text beside; empty if nothing."""
         if self.error or self.frame is None:
             return ""
-        lost = losses(self.frame.ledger.notes)
+        notes = self.frame.ledger.notes
+        if self.catchers.scene is not None and not self.catchers.known:
+            notes += (LEFT_OUT,)
+        lost = losses(notes)
         if not lost:
             return ""
         more = f" (and {len(lost) - 1} more, in Render Properties)" if len(lost) > 1 else ""
@@ -197,7 +206,9 @@ class Viewport:
             if self._target is None and self._sample is None and frame.samples_done:
                 self._resolve(frame)  # the frame outlived an error that took its picture
             elif self._sample is None and frame.samples_done and self._is_shown_otherwise(frame):
-                self._resolve(frame)  # the same samples, at another time or with other settings of a `show` stage
+                # The same samples, at another time or with other settings of a `show` stage.
+                self.catchers.forget()
+                self._resolve(frame)
             spent = self._draw_samples(frame, settings, clock, called, known, budget)
             self.seconds += clock() - started
             if clock() - called + spent > budget or not self._climbs(camera, size, border, settings, clock):
@@ -207,6 +218,8 @@ class Viewport:
         frame = self.frame
         whole = self._beginning is None and self.scale == 1 and not self.direct
         whole = whole and frame.samples_done >= settings.samples
+        if whole and self.catchers.scene is not None and not self.catchers.known:
+            whole = self._caught(frame, lambda: clock() - called > budget)
         if whole and not self._finished:
             self._finished = True
             self.renderer.finish(frame, ())  # publishes the ledger
@@ -215,6 +228,14 @@ class Viewport:
             images.pool.trim()  # what only moving views needed
             self.news = True
         return self.picture
+
+    def _caught(self, frame: Frame, enough: Callable[[], bool]) -> bool:
+        """Work on what the picture at rest shows of shadow catchers; whether it shows that."""
+        self._finished = False
+        self.catchers.draw(frame.settings, self.bands, enough)
+        if self.catchers.known:
+            self._resolve(frame)
+        return self.catchers.known
 
     def _draw_samples(self, frame: Frame, settings: Settings, clock, called: float, known: int, budget: float) -> float:
         """Draw parts of samples until the budget is spent; seconds of the last one. Only a picture of this very view
@@ -265,12 +286,12 @@ class Viewport:
             at = frame.at
             shown = self.renderer.show(frame)
             frame.at = at
-            if self.direct and frame.snapshot.camera.panorama is None:
-                view = View(frame.snapshot.camera, frame.snapshot.film, self.renderer.geometry.origin)
-                scene = self._snapshot, self.renderer.geometry, self.renderer.materials.compiled
-                self.guide.fill_in(shown, self._target, *scene, view)
+            if self.catchers.scene is not None:
+                with images.borrowed(*frame.size, "RGBA32F") as composed:
+                    self.catchers.compose(frame, shown, composed)
+                    self._put(frame, composed.colors[0])
             else:
-                passes.copy(shown, self._target)
+                self._put(frame, shown)
         else:
             one_pass.draw(frame, self.render_pass, self._target)
         self._shown_with, self.looks = frame.plan.shown_with(frame.snapshot, frame.settings), False
@@ -281,6 +302,15 @@ class Viewport:
         x0, y0, x1, y1 = film.border
         self.place = x0 * x, y0 * y, (x1 - x0) * x, (y1 - y0) * y
         self._shown_place = self._begun_for
+
+    def _put(self, frame: Frame, shown: images.Image) -> None:
+        """Take an image of the frame for the picture."""
+        if self.direct and frame.snapshot.camera.panorama is None:
+            view = View(frame.snapshot.camera, frame.snapshot.film, self.renderer.geometry.origin)
+            scene = self._snapshot, self.renderer.geometry, self.renderer.materials.compiled
+            self.guide.fill_in(shown, self._target, *scene, view)
+        else:
+            passes.copy(shown, self._target)
 
     def _with_shapes(self, frame: Frame) -> images.Image | None:
         """The draft that is the picture, in finer pixels, if there is time for that and no lens blurs what it shows."""
@@ -329,6 +359,7 @@ class Viewport:
         """Forget the picture and read the scene anew when it is next drawn."""
         self._drop_picture()
         self._drop_look()
+        self.catchers.forget()
         self._sample = self._beginning = None
         self.dirty = True
 
@@ -394,11 +425,16 @@ class Viewport:
         film = replace(
             self._snapshot.film, width=size[0], height=size[1], border=border, position="film.position" in asked
         )
-        whole, settings = replace(self._snapshot, camera=camera, film=film), replace(settings, shows=asked)
+        whole, caught = replace(self._snapshot, camera=camera, film=film), None
+        if self._snapshot.has_catchers:  # passes, too, are those of what catchers are left out of
+            if self.render_pass is None:
+                caught, asked = whole, frozenset(catcher.IMAGES)
+            whole = catcher.catchers_unseen(whole)
+        settings = replace(settings, shows=asked)
         self.held = False
         drawn = drawn_with(settings, scale, scale == 1 or why in AT_REST)
-        parts = self.renderer.beginning(replace(whole, film=coarser(film, scale)), drawn)
-        begun = Beginning(parts, camera, size, border, scale, why, settings.samples, reading)
+        parts = self.renderer.beginning(replace(whole, film=coarser(whole.film, scale)), drawn)
+        begun = Beginning(parts, camera, size, border, scale, why, settings.samples, reading, caught=caught)
         self.renderer.agrees = lambda _, drawn: self._agreed(begun, whole, settings, drawn)
         self._beginning = begun
 
@@ -462,6 +498,9 @@ class Viewport:
     def _adopt(self, frame: Frame, begun: Beginning, settings: Settings, clock) -> None:
         """Take the frame that is begun for the one that is drawn."""
         frame.shared_out = self.bands if begun.scale == 1 or begun.why in AT_REST else None
+        anew = self.catchers.look_at(begun.caught, frame is self.frame)
+        if anew and self._sample is None and frame.samples_done:
+            self._resolve(frame)
         if frame is self.frame:
             if frame.samples_done < settings.samples:
                 self._finished = False
@@ -484,6 +523,8 @@ class Viewport:
         self.cache.clear()
         self._drop_picture()
         self._drop_look()
+        self.catchers.forget()
+        self.catchers.scene = None
         self.frame = self._sample = self._snapshot = None
 
 

@@ -109,14 +109,3 @@ def test_slices_make_the_picture_of_all_samples(caught, monkeypatch, transparent
     found = with_pass(caught, "CANDELA", 4)
     for name in ("combined", "shadow_catcher", "diffuse_direct"):
         np.testing.assert_allclose(found[name], whole[name], atol=1e-4 * np.abs(whole[name]).max(), err_msg=name)
-
-
-def test_the_viewport_says_what_it_draws(caught):
-    import bpy
-
-    from addon.snapshot import SnapshotCache, take
-
-    notes = take(bpy.context.evaluated_depsgraph_get(), SnapshotCache(), *SIZE).notes
-    assert any("viewport draws" in note.text for note in notes)
-    caught.render(2, SIZE)
-    assert not any("shadow catcher" in note.text for note in ledger.latest().notes)
