@@ -6,12 +6,14 @@ bool mirrors_within(Surface s)
   return s.kind == FRESNEL_DIELECTRIC && s.glossy_ior < 1.0;
 }
 
+#define FROSTED_FROM 0.1  // roughness; as in hits/surface.frag.glsl
+
 // Frosted glass from within is one lobe of both ways, of which a ray takes one by Fresnel's reflectance of the facet that it
 // meets. Were the lobe chosen first, by its albedo, facets of total reflection would weigh as much as the reciprocal of
 // that, at each of the many faces on a path's way.
 bool frosted_within(Surface s)
 {
-  return surface_goes_both_ways(s) && s.glossy_roughness > BOTH_ROUGHNESS;
+  return surface_goes_both_ways(s) && s.glossy_ior < 1.0 && s.glossy_roughness > FROSTED_FROM;
 }
 
 #ifdef TRANSMISSION

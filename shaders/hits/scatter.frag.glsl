@@ -115,7 +115,7 @@ void main()
     surface = interface_edited(surface, s);
     float choice = 1.0;
 #ifdef ONWARD
-    uvec3 roll = roll_of(pixel, 0, film_view.seed, 81 + ray_number);  // of which hits/surface.frag.glsl has drawn nothing
+    uvec3 roll = roll_of(pixel, 0, film_view.seed, 601 + ray_number);
     choice = frosted ? shuffled(film_view.sample_index, roll.xy) : 1.0;
 #endif
     direction = interface_sample(surface, u, choice, weight);
