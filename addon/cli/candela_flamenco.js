@@ -1,5 +1,6 @@
 // A job type of Flamenco 3 for Candela: chunks of frames, slices of samples, and what puts the slices together.
-// It holds for the job that it was written for. It stands in the folder `scripts` beside the manager. Nodes need Blender with Candela, and a shared folder of files.
+// It holds for the job that it was written for, and stands in the folder `scripts` beside the manager. Nodes need Blender
+// with Candela, and a shared folder of files.
 
 // What the job that this file was written for asks of every task, and of those that render: `farm` puts it here.
 const OF_EVERY_TASK = [];
@@ -57,5 +58,6 @@ function compileJob(job) {
 }
 
 function candela(args) {
-    return author.Command("exec", { exe: "{blender}", args: ["--command", "candela", ...args, ...OF_EVERY_TASK, "--progress"] });
+    const all = ["--command", "candela", ...args, ...OF_EVERY_TASK, "--progress"];
+    return author.Command("exec", { exe: "{blender}", args: all });
 }

@@ -117,8 +117,8 @@ def of_rendering(options) -> list[str]:
 def flamenco(name: str, options) -> str:
     """The text of the job type of Flamenco for the file of this name, with what the job asks of its tasks."""
     text = FLAMENCO.read_text(encoding="utf-8").replace('label: "Candela"', f"label: {json.dumps(f'Candela: {name}')}")
-    for name, arguments in (("OF_EVERY_TASK", of_every_task(options)), ("OF_RENDERING", of_rendering(options))):
-        text = text.replace(f"const {name} = [];", f"const {name} = {json.dumps(arguments)};")
+    for of, arguments in (("OF_EVERY_TASK", of_every_task(options)), ("OF_RENDERING", of_rendering(options))):
+        text = text.replace(f"const {of} = [];", f"const {of} = {json.dumps(arguments)};")
     return text
 
 

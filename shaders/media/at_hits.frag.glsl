@@ -19,8 +19,7 @@ void main()
     limit = (max_component(abs(radiance)) > 0.0) ? min(limit, hit_distance) : limit;
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 161 + ray_number).x;
-  float w = met_path_fetch(pixel).w;
-  bool bent = path_is_bent(int(w + 0.5)) || (w > 0.0 && w < 0.5);  // PATH_THROUGH alone
-  media_asked_by(bent ? MEDIA_OF_TRANSMISSION : MEDIA_OF_GLOSSY);
+  int code = int(met_path_fetch(pixel).w + 0.5);  // 0: PATH_THROUGH alone
+  media_asked_by((path_is_bent(code) || code == 0) ? MEDIA_OF_TRANSMISSION : MEDIA_OF_GLOSSY);
   out_passed.rgb = media_transmittance_asked(start, direction, limit, salt);
 }
