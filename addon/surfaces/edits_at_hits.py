@@ -2,7 +2,8 @@
 
 The rotation is solved as for what the camera sees (shaders/edit/lobe.glsl), at the records of hits (hits.py), one pass
 for each edited object and material of it. Distances along the surface come with the corners of triangles, in the order
-in which hits number them. What enters an edited solid takes its edit along until it leaves (`carried`).
+in which hits number them. What enters an edited solid takes its edit along until it leaves (`carried`); where Freeze
+keeps another view of it, it enters as it does in that (`entering`).
 
 | cost | per round of rays |
 |---|---|
@@ -12,7 +13,8 @@ in which hits number them. What enters an edited solid takes its edit along unti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -97,9 +99,21 @@ class EditsAtHits(Service):
 
     name = "edits_at_hits"
 
-    def __init__(self, objects: Sequence[EditedObject]):
+    def __init__(self, objects: Sequence[EditedObject], eyes: np.ndarray):
+        """`eyes`: (E, 3) of views that edits keep, by their numbers."""
         self._objects = objects
+        self._eyes = images.upload_list(np.pad(eyes, ((0, 0), (0, 1)))) if len(eyes) else None
         self._bound: list[tuple[Program, dict]] | None = None
+
+    @contextmanager
+    def entering(self, lobe: images.Image) -> Iterator[None]:
+        """Passes by which light enters these surfaces know the eyes of views that edits keep."""
+        if self._eyes is not None:
+            lobe.beside["frozen_eyes"] = self._eyes
+        try:
+            yield
+        finally:
+            lobe.beside.pop("frozen_eyes", None)
 
     def begin(self, frame: Frame, first: images.Image) -> images.Target:
         """Two images of the pool: the edits at hits, and those that go with rays, at first those of the picture."""

@@ -33,7 +33,10 @@ EDITS = Struct(
     ("vec4", f"region[{2 * MOST_REGIONS}]"),
     ("vec4", f"pair[{3 * MOST_CONSTRAINTS}]"),
     ("vec4", "frozen"),  # the eye of the view that stays, and 1
-    ("vec4", "shape"),  # whether the object is closed, whether a constraint is about what passes
+    (
+        "vec4",
+        "shape",
+    ),  # whether the object is closed, whether a constraint is about what passes, number of the frozen eye
 )
 SOLVE_CONSTANTS = (("INT", "region_count"), ("INT", "constraint_count"), ("FLOAT", "distance_floor"))
 SOLVE = passes.fullscreen_program(
@@ -133,9 +136,11 @@ def edit_table(
     extent: float,
     frozen: np.ndarray | None = None,
     closed: bool = False,
+    frozen_number: int = 0,
 ) -> EditTable:
-    """`members`: for each region the bits of its constraints. `extent` of the object, m. `frozen`: an eye (3,).
-    `closed`: rays that edits send into the object go on where they leave it."""
+    """`members`: for each region the bits of its constraints. `extent` of the object, m. `frozen`: an eye (3,),
+    of a picture's eyes the one that `frozen_number` says, from 1. `closed`: rays that edits send into the object go on
+    where they leave it."""
     region = np.zeros((2 * MOST_REGIONS, 4), np.float32)
     pair = np.zeros((3 * MOST_CONSTRAINTS, 4), np.float32)
     for k, (one, bits) in enumerate(zip(regions, members)):
@@ -156,7 +161,7 @@ def edit_table(
             region=region,
             pair=pair,
             frozen=eye,
-            shape=(float(closed), float(any(one.bent for one in constraints)), 0.0, 0.0),
+            shape=(float(closed), float(any(one.bent for one in constraints)), float(frozen_number), 0.0),
         ),
         constants,
     )

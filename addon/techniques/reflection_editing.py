@@ -161,6 +161,7 @@ class ReflectionEditing(Technique):
         rows = {id(instance): row for row, instance in enumerate(frame.geometry.placed[0])}
         kept: dict[object, _Edited] = {}
         surfaces: dict[object, geodesic.Surface] = {}
+        eyes: list[np.ndarray] = []  # of views that stay, a number each
         for instance in frame.snapshot.instances:
             constraints, regions = _edits(instance)
             mesh = frame.snapshot.meshes[instance.mesh]
@@ -170,25 +171,27 @@ class ReflectionEditing(Technique):
             origin = tuple(frame.geometry.origin)
             where = (instance.mesh, mesh.version, instance.matrix.tobytes(), row, origin)
             surfaces[where] = self._surfaces.get(where) or _surface(frame, instance, mesh)
-            key = (*where, instance.own, instance.materials, _indices(frame, instance))
-            kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, surfaces[where])
+            if own_value(instance.own, ReflectionEditing, "freeze"):
+                eyes.append(_moved(_placed(frame, instance), constraints[0]["viewer"]))
+            key = (*where, instance.own, instance.materials, _indices(frame, instance), len(eyes))
+            kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, surfaces[where], len(eyes))
         self._kept, self._edited, self._surfaces = kept, list(kept.values()), surfaces
         frame.ledger.notes = (*frame.ledger.notes, *self._unfrozen(frame))
         frame.shared(SurfaceStages).apply.append(self._at_film_point)
-        frame.provide(EditsAtHits([one.at_hits for one in self._edited]))
+        frame.provide(EditsAtHits([one.at_hits for one in self._edited], np.reshape(eyes, (-1, 3))))
 
     def _unfrozen(self, frame: Frame) -> list[Note]:
-        """What Freeze does not keep: where light leaves closed glass follows from the view through it."""
-        solids = [one.at_hits.instance for one in self._edited if one.at_hits.outward]
-        text = (
-            "Freeze Reflections keeps what the glass mirrors, not what is seen through it, which is edited as in the "
-            "view of now. Render from where the constraint was made (Return to View) for the picture that was meant."
-        )
-        return [
-            Note(f"Object '{one.object_name}'", text) for one in solids
-            if own_value(one.own, ReflectionEditing, "freeze")
-            and any(frame.materials.compiled[slot].glass for slot in one.materials)
-        ]  # fmt: skip
+        """What Freeze does not keep: of glass one of its two ways is edited."""
+        mirrors, shows = "what the glass mirrors", "what is seen through it"
+        found = []
+        for one in (one.at_hits.instance for one in self._edited):
+            glass = any(frame.materials.compiled[slot].glass for slot in one.materials)
+            if glass and own_value(one.own, ReflectionEditing, "freeze"):
+                bends = any(constraint["of"] == REFRACTION for constraint in _edits(one)[0])
+                kept, left, other = (shows, mirrors, "Reflection") if bends else (mirrors, shows, "Refraction")
+                text = f"Freeze Reflections keeps {kept}, not {left}: that is for constraints of {other} alone."
+                found.append(Note(f"Object '{one.object_name}'", text))
+        return found
 
     def sample(self, frame: Frame) -> None:
         self._edit(frame, {name: frame.images[f"surface.{name}"] for name in SURFACE_IMAGES}, EDIT)
@@ -259,7 +262,10 @@ def _placed(frame: Frame, instance: Instance) -> np.ndarray:
     return matrix
 
 
-def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geodesic.Surface) -> _Edited:
+def _made(
+    frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geodesic.Surface, eyes: int
+) -> _Edited:  # fmt: skip
+    """`eyes`: how many views that stay there are, this object's, if it has one, being the last."""
     matrix, world, corners = _placed(frame, instance), surface.positions, surface.triangles
     surface.begin()
     wanted_constraints, wanted_regions = _edits(instance)
@@ -297,7 +303,7 @@ def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geode
     if own_value(instance.own, ReflectionEditing, "freeze"):
         frozen = _moved(matrix, wanted_constraints[0]["viewer"])
     extent = float(np.linalg.norm(np.ptp(world, axis=0)))
-    table = reflection_edits.edit_table(found, regions, members, extent, frozen, closed)
+    table = reflection_edits.edit_table(found, regions, members, extent, frozen, closed, eyes)
     count = -(-len(layers) // 4)
     packed = np.zeros((len(world), 4 * count), np.float32)
     for k, layer in enumerate(layers):

@@ -30,6 +30,7 @@ the footprint of the pixel, not over the width of a lobe.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 from functools import cache
 
 import numpy as np
@@ -377,18 +378,20 @@ class ShadedReflections(Technique, BothWays):
     def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before, way: int = 0) -> None:
         """Rays of the lobes of `surfaces`, into `rays`. `way`: of glass that goes both ways."""
         images.Target(rays.colors[1:2]).clear()  # a ray without direction is none, whatever else stands there
-        passes.fullscreen(
-            scatter_program(bool(before)),
-            images.Target(rays.colors, depth),
-            where=MET if before else ANY_SURFACE,
-            textures={**surfaces, "energy_table": frame.materials.energy_table, **before},
-            blocks={"film_view": frame.view_block},
-            constants={
-                **reach, "ray_number": number, "offset_size": frame.offset_size,
-                "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
-                "first_rays": self._first_rays, "way": way,
-            },
-        )  # fmt: skip
+        edits = frame.service(EditsAtHits)
+        with edits.entering(surfaces["surface_lobe"]) if edits is not None else nullcontext():
+            passes.fullscreen(
+                scatter_program(bool(before)),
+                images.Target(rays.colors, depth),
+                where=MET if before else ANY_SURFACE,
+                textures={**surfaces, "energy_table": frame.materials.energy_table, **before},
+                blocks={"film_view": frame.view_block},
+                constants={
+                    **reach, "ray_number": number, "offset_size": frame.offset_size,
+                    "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
+                    "first_rays": self._first_rays, "way": way,
+                },
+            )  # fmt: skip
         frame.count(self, "passes")
 
     def _pass_media(self, frame, rays, records, closures, sources, count, number, transmission) -> None:

@@ -1,13 +1,4 @@
-// Where the middle of a lobe comes from: mirrored, or bent.
-vec3 reflected_or_bent(Surface s, vec3 viewer, bool bent)
-{
-  float cosine = dot(viewer, s.glossy_normal);
-  if (!bent) {
-    return safe_normalize(2.0 * cosine * s.glossy_normal - viewer);
-  }
-  float squared = 1.0 - (1.0 - cosine * cosine) / (s.glossy_ior * s.glossy_ior);
-  return safe_normalize((cosine / s.glossy_ior - sqrt(max(squared, 0.0))) * s.glossy_normal - viewer / s.glossy_ior);
-}
+#include "edit/frozen.glsl"
 
 // The rotation for a surface of the edited object, as surface_edited of lib/gbuffer.glsl takes it; 0: none.
 vec4 edit_of_surface(Surface s, vec3 viewer)
@@ -21,11 +12,13 @@ vec4 edit_of_surface(Surface s, vec3 viewer)
   if (edits.frozen.w > 0.5) {
     meant = reflected_or_bent(s, safe_normalize(edits.frozen.xyz - s.position), bent);
   }
-  // What leaves a closed object is turned beyond it, where nothing here knows its direction.
+  // What leaves a closed object is turned beyond it, where nothing here knows its direction. Freeze turns what enters it, by
+  // the eye whose number is in the length (edit/frozen.glsl).
   vec4 q = edited_rotation(s.position, (bent && solid) ? vec3(0.0) : meant, bent);
   if (dot(q, q) == 0.0) {
     return vec4(0.0);
   }
   q = (edits.frozen.w > 0.5 && !(bent && solid)) ? quaternion_product(q, quaternion_between(r, meant)) : q;
-  return normalize(q) * ((solid ? 2.0 : 1.0) + (mirrored ? 2.0 : 0.0));
+  float number = (bent && solid && edits.frozen.w > 0.5) ? edits.shape.z / FROZEN_NUMBERS : 0.0;
+  return normalize(q) * ((solid ? 2.0 : 1.0) + (mirrored ? 2.0 : 0.0) + number);
 }

@@ -13,6 +13,9 @@
 #include "hits/path.glsl"
 #define TRANSMISSION  // for interface_met
 #include "hits/onward.glsl"
+#ifdef HAS_FROZEN_EYES
+#include "edit/frozen.glsl"
+#endif
 
 #define LEAST_MIRRORED 0.05  // as in hits/surface.frag.glsl
 
@@ -131,6 +134,11 @@ void main()
 #endif
     density = mirrors_it ? 0.0 : density;  // light samples leave that out
     weight *= ((dot(direction, s.geometric_normal) < 0.0) != mirrors_it || surface_is_edited(s)) ? 1.0 : 0.0;
+#ifdef HAS_FROZEN_EYES
+    if (edits_what_leaves(s) && s.glossy_ior > 1.0 && dot(direction, surface.normal) < 0.0) {
+      direction = entering_frozen(s, surface_edit_fetch(pixel), viewer, direction);
+    }
+#endif
 #ifdef HAS_CARRIED_EDIT
     if (edited && s.glossy_ior <= 1.0 && dot(direction, surface.normal) < 0.0) {  // what leaves an edited object goes where the edit turns it
       vec4 edit = carried_edit_fetch(pixel);

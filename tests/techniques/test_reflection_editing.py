@@ -628,6 +628,43 @@ def test_what_freeze_does_not_keep_of_glass_is_told(stage):
     assert any("Freeze" in note.text and ball.name in note.subject for note in stage.ledger.notes)
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_freeze_keeps_what_is_seen_through_closed_glass(stage, mirrored):
+    """Every place of a ball shows from another eye, also by a mirror, what it shows from that of its constraint."""
+    ball = sphere(stage, stage.material("ShaderNodeBsdfRefraction", IOR=1.4, Roughness=0.0), rings=32)
+    nodes, links = stage.world((1, 1, 1), 1.0).node_tree.nodes, stage.scene.world.node_tree.links
+    where = nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+    links.new(where, nodes["Background"].inputs["Color"])
+    constrain(ball, (0, -1, 0), (3, 5, 2), (0, -4, 0))
+    ball.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    angle = np.radians(35)
+    eyes = [np.array([0.0, -4.0, 0.0]), 4.0 * np.array([np.sin(angle), -np.cos(angle), 0.0])]
+    if mirrored:  # the second eye is behind a mirror that the camera looks at
+        silver = stage.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1))
+        stage.rectangle((-4, -4), (4, 4), material=silver, location=(2, 0, 0), turn=(0, -np.pi / 2, 0))
+
+    def shown(turn, frozen, towards):
+        """At some places of the ball, from an eye."""
+        ball.candela.reflection_editing_freeze = frozen
+        eye = eyes[turn] * [-1, 1, 1] + [4, 0, 0] if mirrored and turn else eyes[turn]
+        stage.camera(tuple(eye), (np.pi / 2, 0, (angle if not mirrored else -angle) * turn), 0.6)
+        picture = stage.render(2, (64, 64), bounces=4)["combined"][..., :3]
+        found = []
+        for place in towards:
+            away = place - eyes[turn]
+            forward = -eyes[turn] / 4.0
+            right = np.cross(forward, (0, 0, 1)) * (-1 if mirrored and turn else 1)
+            x, y = (31.5 + 32 * (away @ side) / (away @ forward) / np.tan(0.3) for side in (right, np.array((0, 0, 1))))
+            found.append(picture[round(y), round(x)])
+        return np.array(found)
+
+    turns, rises = np.meshgrid(np.radians([5, 15, 25]), np.radians([-20, 0, 20]))
+    places = np.stack([np.cos(rises) * np.sin(turns), -np.cos(rises) * np.cos(turns), np.sin(rises)], -1).reshape(-1, 3)
+    expected = shown(0, False, places)
+    assert np.abs(shown(1, True, places) - expected).max() < 0.06
+    assert np.abs(shown(1, False, places) - expected).max() > 0.3
+
+
 @pytest.mark.parametrize("degrees", [15, 60])
 def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees):
     """Edited rays that point into the ball show what is behind it, not its inside."""
