@@ -55,6 +55,21 @@ def test_pictures_that_cannot_be_compared_are_red(truth, wrong):
     assert "failed" in found and pairs.colour(found) == pairs.RED
 
 
+def test_a_short_reference_allows_nothing(truth):
+    """Its own noise is in the error already: what is within bounds all the same needs no longer one."""
+    half = np.kron(np.random.default_rng(3).normal(0.0, 0.1, (6, 8, 1)), np.ones((4, 4, 3)))
+    assert not pairs.judged(truth + half, truth, half, 16, allowing=False)["good"]
+    assert pairs.judged(truth * 1.01, truth, half, 16, allowing=False)["good"]
+
+
+def test_what_has_met_least_comes_first():
+    every, known = pairs.chosen(options()), {"sun + glass": {}, "glass + mirror": {}}
+    order = pairs.rarest_first(every, known)
+    assert sorted(order) == sorted(every)
+    assert not {"sun", "glass", "mirror"} & {name for names in order[:15] for name in names}
+    assert {name for names in order[:80] for name in names} >= set(FEATURES) - set(pairs.DEAR)
+
+
 def test_what_is_said_is_amber():
     told, silent = ({"good": False, "notes": notes} for notes in (["Object 'A': is left out."], []))
     assert (pairs.colour(told), pairs.colour(silent)) == (pairs.AMBER, pairs.RED)
@@ -94,7 +109,7 @@ def stage(registered):
 @pytest.mark.slow
 @pytest.mark.parametrize("names", random.Random(61).sample(SOUND, FEW), ids=pairs.key)
 def test_pairs_beside_cycles(stage, names, monkeypatch):
-    monkeypatch.setattr(pairs, "REFERENCE_SAMPLES", 128)
+    monkeypatch.setattr(pairs, "REFERENCE_SAMPLES", (16, 128))
     found = pairs.measure(stage, names, [1, 16])
     print(pairs.line(names, found))
     assert all(pairs.colour(one) != pairs.RED for one in found.values())
