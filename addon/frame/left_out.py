@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from ..materials import gloss
 from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..snapshot.panorama import bends_lines
@@ -28,6 +29,8 @@ BRINGS = {
 COLOURED = ("instant_radiosity", "multires_radiosity", "clustered_visibility")  # whose rays take colours of layers
 GEM = 2.0  # index of refraction, from which on most directions are mirrored totally
 GEM_INTERFACES = 24  # crossings that such glass needs
+ANSWERED = 0.25  # roughness up to which a metal's light is that of caustics (lighting/caustic_casters.py)
+WIDE = 0.45  # roughness from which a lobe is about as wide as those of paths (shaders/indirect/albedo.glsl)
 NO_GRASS = ("no material", "it is not in the pass tree")  # how reasons begin that nobody need hear
 
 
@@ -39,7 +42,7 @@ def notes_of(
     used = (one for k, one in enumerate(materials) if k in snapshot.used_materials)
     return (
         *_for_size(plan, snapshot), *_where_systems_meet(plan, settings), *_bounces_past(plan, tinted),
-        *_kept_inside(plan, settings, used),
+        *_kept_inside(plan, settings, used), *_thrown_wide(plan, snapshot, settings, materials),
     )  # fmt: skip
 
 
@@ -53,6 +56,25 @@ def _kept_inside(plan: Plan, settings: Settings, used: Iterable[CompiledMaterial
             inside = f"with an index of refraction of {one.glass.ior:.2f} it reflects light inside more often than"
             text = f"{inside} {rays.label} follows ({followed} Interfaces), so it looks too dark: set Interfaces to 32."
             yield Note(f"Material '{one.name}'", text, one.name)
+
+
+def _thrown_wide(
+    plan: Plan, snapshot: Snapshot, settings: Settings, materials: Sequence[CompiledMaterial]
+) -> Iterator[Note]:
+    """Gloss that is narrower than the lobes of paths and no caustic: what it throws onto surfaces is blurred."""
+    if "indirect" not in plan.filled or settings.bounces <= 0:
+        return
+    least = ANSWERED if "caustics" in plan.filled else 0.0
+    names = []
+    for number in sorted(snapshot.used_materials):
+        graph = snapshot.materials[number].graph
+        narrow = [rough for rough in gloss.mirrors(graph) if least < rough] + list(gloss.polish(graph))
+        if min(narrow, default=1.0) < WIDE:
+            names.append(f"'{materials[number].name}'")
+    if names:
+        told = _together(names if len(names) < 4 else [*names[:2], f"{len(names) - 2} other materials"])
+        text = f"what {told} throw onto other surfaces is spread as by a roughness of 0.5, so lamps' reflections there"
+        yield Note("Gloss", f"{text} are softer than in Cycles. Metals of roughness 0.25 or less throw caustics.")
 
 
 def _bounces_past(plan: Plan, tinted: Iterable[CompiledMaterial]) -> Iterator[Note]:

@@ -1,8 +1,8 @@
 """Casters of caustics: the materials, objects and lights that techniques of the slot `caustics` take over.
 
 A material is a caster if it bends light (glass, of any roughness) or mirrors it with no diffuse part to speak of
-(Glossy, Metallic, or Principled with metallic from METALLIC on) and is smooth: roughness up to SMOOTH, known from the
-socket's own value. What a varnish over a diffuse surface mirrors stays with indirect light.
+(materials/gloss.py) and is smooth: roughness up to SMOOTH, known from the socket's own value. What a varnish over a
+diffuse surface mirrors stays with indirect light.
 
 A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. So are emissive meshes,
 and, where there is glass, the bright part of the world (sources/bright_world.py): the rest of it is wide light, which
@@ -30,8 +30,9 @@ import numpy as np
 
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.picture import Frame
+from ..materials import gloss
 from ..materials.compiler import may_emit, may_refract
-from ..materials.graph import Graph, Node
+from ..materials.graph import Graph
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from ..sources import lights
 from ..sources.bright_world import BrightPart, bright_part
@@ -40,7 +41,6 @@ from .light_views import groups
 SLOT = "caustics"
 MESHES, WORLD = "emissive meshes", "the world"  # keys beside those of lamps, which are none of these
 SMOOTH = 0.25  # roughness
-METALLIC = 0.5
 MARGIN = 0.02  # of a caster's box, for what its float32 bounds miss
 FLAT = 0.999  # cosine between normals of a pane's faces
 MOST_LOOKED_AT = 200_000  # triangles of a mesh of which it is asked whether it is convex
@@ -48,26 +48,11 @@ LEAST_BENT = 0.4  # share of a convex mesh's edges at which it bends: a cube's f
 _FEWEST_EDGES = 100
 _BUMPS = ("ShaderNodeBump", "ShaderNodeNormalMap", "ShaderNodeDisplacement", "ShaderNodeVectorDisplacement")
 _CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHoldout", "ShaderNodeBsdfRayPortal")
-_MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
 
 
 def mirror_roughness(graph: Graph) -> float | None:
     """Roughness of a material that mirrors photons; None if it does not."""
-    found = [
-        rough
-        for node in graph.nodes.values()
-        if (node.type in _MIRRORS or (node.type == "ShaderNodeBsdfPrincipled" and _value(node, "Metallic") >= METALLIC))
-        for rough in [_value(node, "Roughness", 1.0)]
-        if rough <= SMOOTH
-    ]
-    return min(found, default=None)
-
-
-def _value(node: Node, name: str, unknown: float = 0.0) -> float:
-    socket = node.inputs.get(name)
-    if socket is None or socket.link is not None or socket.value is None:
-        return unknown
-    return float(np.ravel(socket.value)[0])
+    return min((rough for rough in gloss.mirrors(graph) if rough <= SMOOTH), default=None)
 
 
 @dataclass(frozen=True)
@@ -209,7 +194,7 @@ def stopped_by_all(frame: Frame) -> frozenset[int]:
 def _may_be_clear(graph: Graph) -> bool:
     """Whether something besides glass may let light pass."""
     return any(
-        node.type in _CLEAR or (node.type == "ShaderNodeBsdfPrincipled" and _value(node, "Alpha", unknown=0.0) < 1.0)
+        node.type in _CLEAR or (node.type == "ShaderNodeBsdfPrincipled" and gloss.value(node, "Alpha") < 1.0)
         for node in graph.nodes.values()
     )
 

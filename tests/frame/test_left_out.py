@@ -7,6 +7,8 @@ import pytest
 from addon.frame import left_out
 from addon.frame.ledger import SKIPPED, Row
 from addon.frame.plan import Plan
+from addon.lighting import caustic_casters
+from addon.materials.graph import Graph, Input, Node
 from addon.scene import acceleration
 from addon.snapshot.panorama import bends_lines
 from addon.ui.notes import losses
@@ -111,3 +113,43 @@ def test_gems_that_mirror_more_often_than_is_followed_are_named(monkeypatch):
     (note,) = left_out.notes_of(plan, scene, few, materials)
     assert note.subject == "Material 'Diamond'" and "2.42" in note.text and "(8 Interfaces)" in note.text
     assert left_out.notes_of(plan, scene, enough, materials) == ()
+
+
+def glossy(name, **inputs):
+    values = {"Base Color": (0.8, 0.8, 0.8, 1.0), "Specular IOR Level": 0.5, **inputs}
+    node = Node("shader", "shader", "ShaderNodeBsdfPrincipled", {k: Input("FLOAT", v) for k, v in values.items()})
+    return SimpleNamespace(name=name, tinted=False, emissive=False, glass=None), Graph({"shader": node})
+
+
+@pytest.mark.parametrize(("inputs", "said"), [
+    ({"Metallic": 1.0, "Roughness": 0.3}, True), ({"Metallic": 1.0, "Roughness": 0.2}, False),
+    ({"Metallic": 1.0, "Roughness": 0.5}, False), ({"Roughness": 0.1}, False),
+    ({"Roughness": 0.1, "Base Color": (0.02, 0.02, 0.02, 1.0)}, True),
+    ({"Roughness": 0.6, "Base Color": (0.02, 0.02, 0.02, 1.0)}, False),
+    ({"Roughness": 0.6, "Base Color": (0.02,) * 3 + (1.0,), "Coat Weight": 1.0, "Coat Roughness": 0.03}, True),
+])  # fmt: skip
+def test_gloss_that_is_thrown_wider_than_it_is_is_named(monkeypatch, inputs, said):
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    assert left_out.ANSWERED == caustic_casters.SMOOTH
+    material, graph = glossy("Pan", **inputs)
+    scene = SimpleNamespace(camera=None, used_materials={0}, materials=[SimpleNamespace(graph=graph)])
+    plan, some = Plan((), (), {"indirect": "instant_radiosity", "caustics": "caustics"}), SimpleNamespace(bounces=4)
+    notes = left_out.notes_of(plan, scene, some, [material])
+    assert bool(notes) == said and all("'Pan'" in note.text and note.subject == "Gloss" for note in notes)
+    assert (
+        left_out.notes_of(plan, scene, FEW, [material])
+        == left_out.notes_of(Plan((), (), {}), scene, some, [material])
+        == ()
+    )
+
+
+def test_smooth_metal_is_named_where_nothing_throws_caustics(monkeypatch):
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    made = [glossy(f"Metal {k}", Metallic=1.0, Roughness=0.1) for k in range(4)]
+    materials = [SimpleNamespace(graph=graph) for _, graph in made]
+    scene = SimpleNamespace(camera=None, used_materials={0, 1, 2, 3}, materials=materials)
+    plan = Plan((), (), {"indirect": "instant_radiosity"})
+    (note,) = left_out.notes_of(plan, scene, SimpleNamespace(bounces=4), [one for one, _ in made])
+    assert "'Metal 0', 'Metal 1' and 2 other materials" in note.text

@@ -1,0 +1,47 @@
+"""How narrow the gloss of a material is, as far as its tree says so without running."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .graph import Graph, Node
+from .working_space import current
+
+METALLIC = 0.5  # from which on a Principled BSDF mirrors
+DARK = 0.1  # luminance of a base of which the polish above it throws more light
+_MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
+
+
+def mirrors(graph: Graph) -> Iterator[float]:
+    """Roughness of each lobe of metal; 1 where a texture says it."""
+    for node in graph.nodes.values():
+        metal = node.type == "ShaderNodeBsdfPrincipled" and value(node, "Metallic") >= METALLIC
+        if metal or node.type in _MIRRORS:
+            yield value(node, "Roughness", 1.0)
+
+
+def polish(graph: Graph) -> Iterator[float]:
+    """Roughness of each lobe of varnish over a base as dark as DARK; 1 where a texture says it."""
+    for node in graph.nodes.values():
+        opaque = node.type == "ShaderNodeBsdfPrincipled" and value(node, "Transmission Weight") < 0.5
+        if opaque and value(node, "Metallic") < METALLIC and _luminance(node) <= DARK:
+            yield value(node, "Roughness", 1.0) if value(node, "Specular IOR Level") > 0.0 else 1.0
+            yield value(node, "Coat Roughness", 1.0) if value(node, "Coat Weight") >= 0.5 else 1.0
+
+
+def value(node: Node, name: str, unknown: float = 0.0) -> float:
+    """A socket's own value, or `unknown` where it is linked or missing."""
+    socket = node.inputs.get(name)
+    if socket is None or socket.link is not None or socket.value is None:
+        return unknown
+    return float(np.ravel(socket.value)[0])
+
+
+def _luminance(node: Node) -> float:
+    """Of a Principled BSDF's base; 1 where it is linked."""
+    socket = node.inputs.get("Base Color")
+    if socket is None or socket.link is not None or socket.value is None:
+        return 1.0
+    return float(np.ravel(socket.value)[:3] @ current().luminance)
