@@ -73,8 +73,8 @@ def _thrown_wide(
             names.append(f"'{materials[number].name}'")
     if names:
         told = _together(names if len(names) < 4 else [*names[:2], f"{len(names) - 2} other materials"])
-        text = f"what {told} throw onto other surfaces is spread as by a roughness of 0.5, so lamps' reflections there"
-        yield Note("Gloss", f"{text} are softer than in Cycles. Metals of roughness 0.25 or less throw caustics.")
+        text = f"light that other surfaces get from the gloss of {told} is spread as by a roughness of 0.5: lamps'"
+        yield Note("Gloss", f"{text} reflections there are softer. Metals of roughness 0.25 or less throw caustics.")
 
 
 def _bounces_past(plan: Plan, tinted: Iterable[CompiledMaterial]) -> Iterator[Note]:

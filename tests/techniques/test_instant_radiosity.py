@@ -107,6 +107,26 @@ def test_a_glossy_floor_lights_the_wall_that_its_lobe_meets(stage, render, side,
     assert light.mean() == pytest.approx(expected.mean(), rel=0.04 if side == 1 else 0.15)
 
 
+def fresnel(cosine, index=1.5):
+    """Of light that is not polarised, from outside."""
+    c, g = cosine, np.sqrt(index**2 - 1 + cosine**2)
+    return 0.5 * ((g - c) / (g + c)) ** 2 * (1 + ((c * (g + c) - 1) / (c * (g - c) + 1)) ** 2)
+
+
+def test_a_polished_floor_throws_what_fresnel_says_at_grazing_incidence(stage, render):
+    """A lamp low above black polish, mirrored onto a wall: lobes are widened, and wide ones reflect half of that."""
+    stage.rectangle((-20, -20), (20, 2), material=stage.principled(Base_Color=(0, 0, 0, 1), Roughness=0.05))
+    stage.mesh([(-4, 2, 0), (4, 2, 0), (4, 2, 6), (-4, 2, 6)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
+    stage.light("POINT", (0, -3, 0.8), energy=100 * np.pi, shadow_soft_size=0.05)  # intensity 25
+    camera = stage.camera((0, -8, 1.5), (np.pi / 2, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 3.0
+    across, height = np.meshgrid((np.arange(12) + 0.5) / 4 - 1.5, (np.arange(12) + 0.5) / 4)
+    far = np.sqrt(across**2 + 5**2 + (height + 0.8) ** 2)
+    mirrored = 25 / np.pi / far**2 * (5 / far) * fresnel((height + 0.8) / far)
+    light = render(1, samples=8, size=(12, 12))["diffuse_indirect"]
+    assert light.mean() == pytest.approx(mirrored.mean(), rel=0.12)
+
+
 def corner(stage, albedo=0.7, energy=60.0, lamps=1):
     """A floor, a wall and a ceiling with a lamp between them."""
     material = stage.diffuse(albedo)
