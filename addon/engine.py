@@ -28,7 +28,7 @@ from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, shutter,
 from .snapshot.baking import instance_of, seen_by_nobody, triangles_of
 from .snapshot.errors import unforeseen
 from .snapshot.motion import STEPS, Moment, read_moment
-from .snapshot.scene import Note, Snapshot, one_line
+from .snapshot.scene import Camera, Note, Snapshot, one_line
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
@@ -194,15 +194,12 @@ class CandelaEngine(bpy.types.RenderEngine):
         if getattr(self, "_refused", None):
             self._fail(self._refused)
         if snapshot is not None:
-            for eye in eyes(depsgraph.scene):
-                self._render(depsgraph, snapshot, eye)
-                if self.test_break():
-                    break
+            self._render(depsgraph, snapshot)
 
-    def _seen(self, depsgraph, snapshot: Snapshot, eye: str) -> Snapshot:
-        """The same scene through the camera of a view, where there are several."""
+    def _camera_of(self, depsgraph, snapshot: Snapshot, eye: str) -> Camera | None:
+        """The camera of a view, where there are several."""
         if not eye:
-            return snapshot
+            return None
         self.active_view_set(eye)
         scene, film = depsgraph.scene_eval, snapshot.film
         camera = self.camera_override or scene.camera
@@ -210,44 +207,31 @@ class CandelaEngine(bpy.types.RenderEngine):
         matrix = self.camera_model_matrix(camera, use_spherical_stereo=spherical)
         placed = np.array(matrix, np.float64).reshape(4, 4)
         shift = self.camera_shift_x(camera)
-        view = camera_of_scene(
+        return camera_of_scene(
             scene, depsgraph, film.width, film.height, camera, placed, shift, eye if spherical else ""
         )
-        return replace(snapshot, camera=view)
 
-    def _render(self, depsgraph, snapshot: Snapshot, eye: str) -> None:
+    def _render(self, depsgraph, snapshot: Snapshot) -> None:
         started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
         settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer, depsgraph=depsgraph)
         result = None
         try:
             check_tree(settings.passes)
-            order = self._order(scene, layer, self._seen(depsgraph, snapshot, eye), settings, started, eye)
-            parts = main_loop.taken(final.steps(order))
-            while True:
-                try:
-                    progress = next(parts)
-                except StopIteration as end:
-                    pixels, ledger = end.value
-                    break
+            eyes = tuple((eye, self._camera_of(depsgraph, snapshot, eye)) for eye in eyes_of(scene))
+            order = self._order(scene, layer, snapshot, settings, started, eyes)
+            for progress in (parts := main_loop.taken(final.steps(order))):
                 if progress is not None:
-                    result = self._tell(progress, result, layer.name, eye)
+                    result = self._tell(progress, result, layer.name)
+                    if progress.pixels is not None:
+                        self._end(result, progress, order, layer.name, started)
+                        result, ledger = None, progress.ledger
                 if self.test_break():
                     parts.close()
                     if result is not None:
                         self.end_result(result, cancel=True, do_merge_results=True)  # what is there stays in view
                     return
-            if result is None:
-                result = self._begun(pixels["Combined"], layer.name, eye)
-            for name, array in pixels.items():
-                _fill(result, name, eye, array)
-            seen = (order.snapshot, *(order.moments.snapshots if order.moments is not None else ()))
-            for name, text in cryptomatte_metadata(seen, layer.name).items():
-                self.get_result().stamp_data_add_field(name, text)
-            for name, text in render_metadata(layer.name, ledger, time.perf_counter() - started).items():
-                self.get_result().stamp_data_add_field(name, text)
-            self.end_result(result)
-            self._tell(FINISHED, None, layer.name, eye)
+            self._tell(FINISHED, None, layer.name)
         except (ValueError, RuntimeError) as error:
             self._fail(str(error))
             return
@@ -261,8 +245,18 @@ class CandelaEngine(bpy.types.RenderEngine):
             if ledger.bad_pixels:
                 self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
 
+    def _end(self, result, done: final.Progress, order: final.Order, layer: str, started: float) -> None:
+        """Hand over the picture of an eye, with what tells of it."""
+        for name, array in done.pixels.items():
+            _fill(result, name, done.eye, array)
+        seen = (order.snapshot, *(order.moments.snapshots if order.moments is not None else ()))
+        told = cryptomatte_metadata(seen, layer) | render_metadata(layer, done.ledger, time.perf_counter() - started)
+        for name, text in told.items():
+            self.get_result().stamp_data_add_field(name, text)
+        self.end_result(result)
+
     def _order(
-        self, scene, layer, snapshot: Snapshot, settings: Settings, started: float, eye: str = ""
+        self, scene, layer, snapshot: Snapshot, settings: Settings, started: float, eyes: tuple = final.ONE_EYE
     ) -> final.Order:
         """What this render asks for."""
         shared = session(scene, "preview" if self.is_preview else "final")
@@ -277,34 +271,28 @@ class CandelaEngine(bpy.types.RenderEngine):
         keep = None
         if taken is not None:
             keep = partial(taken.__setitem__, layer.name)
-        catches, moments = snapshot.has_catchers and not self.is_preview, self._moments
-        if moments is not None and eye:  # seen through the eye's camera at the frame itself
-            seen = (replace(one, camera=snapshot.camera) for one in moments.snapshots)
-            moments = replace(moments, snapshots=tuple(seen))
+        catches = snapshot.has_catchers and not self.is_preview
         return final.Order(
             shared.renderer, snapshot, settings, wanted_passes(layer, scene),
             parts=_whole_samples if bpy.app.background else samples_in_parts, notes=notes,
             shows=not bpy.app.background and not self.is_preview, started=started, sync_seconds=self._sync_seconds,
             before=_free_old_sessions, given=given.get(layer.name), take=keep,
-            moments=moments, catches=catches,
+            moments=self._moments, catches=catches, eyes=eyes,
         )  # fmt: skip
 
-    def _begun(self, picture: np.ndarray, layer: str, eye: str):
-        """A result of Blender's for a picture of this size."""
-        height, width = picture.shape[:2]
-        return self.begin_result(0, 0, width, height, layer=layer, view=eye)
-
-    def _tell(self, progress: final.Progress, result, layer: str, eye: str):
+    def _tell(self, progress: final.Progress, result, layer: str):
         """Show how far the render is; returns the result that shows its picture, if there is one yet."""
         self.update_stats("Candela", progress.text)
         if told is not None:
             told(progress)
         if progress.share is not None:
             self.update_progress(progress.share)
+        picture = progress.picture if progress.pixels is None else progress.pixels["Combined"]
+        if picture is not None and result is None:
+            height, width = picture.shape[:2]
+            result = self.begin_result(0, 0, width, height, layer=layer, view=progress.eye)
         if progress.picture is not None:
-            if result is None:
-                result = self._begun(progress.picture, layer, eye)
-            _fill(result, "Combined", eye, progress.picture)
+            _fill(result, "Combined", progress.eye, picture)
             self.update_result(result)
         return result
 
@@ -374,7 +362,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._fail(unforeseen(error))
 
 
-def eyes(scene) -> list[str]:
+def eyes_of(scene) -> list[str]:
     """Names of the views that are rendered; one without a name where there is but one."""
     render = scene.render
     if not render.use_multiview:

@@ -7,14 +7,16 @@ done, and the picture as it grows. It is shown so rarely that reading it back ta
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
+from itertools import groupby
 from statistics import median
 
 import numpy as np
 
 from .film import catcher
 from .film.noise import NoiseMeter
+from .film.takes import ONE_EYE, Picture, Take, frame_images, takes_of
 from .frame import ledger as ledgers
 from .frame import slices, time_steps
 from .frame.light_paths import LIGHT_PATHS
@@ -24,10 +26,8 @@ from .frame.settings import Settings
 from .frame.within_sample import WithinSample
 from .gfx import images, library
 from .gfx.context import turn
-from .snapshot.light_groups import parts_of
-from .snapshot.scene import Note, Snapshot
+from .snapshot.scene import Camera, Note, Snapshot
 from .snapshot.shutter import Moments
-from .ui import light_groups
 from .ui.passes import CAMERA_AXES, CATCHER, GLARE, NOISY, RenderPass
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
@@ -39,7 +39,9 @@ TELL_S = 0.5  # between two sentences about one sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
 SHOW_SHARE = 0.04  # of the render's time, at most, that is spent on showing it
 COMBINED = "film.combined"
-PICTURES_OF_CATCHERS = 3  # of which a picture with shadow catchers is made
+
+
+Pixels = dict[str, np.ndarray]  # of passes by Blender's name, (H, W, channels) float32
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,9 @@ class Progress:
     share: float | None = None
     picture: np.ndarray | None = None  # (H, W, 4) float32: the mean of the samples so far
     left: float | None = None  # seconds until the end, about, as the text says
+    eye: str = ""  # of which this is told
+    pixels: Pixels | None = None  # of an eye's picture that is done
+    ledger: ledgers.Ledger | None = None  # the same
 
 
 @dataclass
@@ -70,95 +75,89 @@ class Order:
     take: Callable[[slices.Slice], None] | None = None  # what is drawn, as a slice
     moments: Moments | None = None  # the scene while the shutter is open, where motion blur finds that it moves
     catches: bool = False  # whether shadow catchers are drawn as such
+    eyes: tuple[tuple[str, Camera | None], ...] = ONE_EYE  # views, and cameras in place of the snapshot's
 
-    def of_scene(self, changed: Callable[[Snapshot], Snapshot], settings: Settings) -> Order:
-        """The same of a scene of which something is changed."""
-        moments = self.moments
-        if moments is not None:
-            moments = replace(moments, snapshots=tuple(changed(one) for one in moments.snapshots))
-        return replace(self, snapshot=changed(self.snapshot), moments=moments, settings=settings)
+    @property
+    def is_of_slices(self) -> bool:
+        """Whether its sums are taken, or given, which hold all there is."""
+        return self.take is not None or self.given is not None
 
 
-def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.ndarray], ledgers.Ledger]]:
-    """Draw the picture, for each of its light groups; returns pass pixels by Blender's name, (H, W, channels) float32,
-    and the ledger.
+def steps(order: Order) -> Generator[Progress | None, None, tuple[Pixels, ledgers.Ledger]]:
+    """Draw the pictures of all eyes, take by take; returns the passes of the last of them, and the ledger. `Progress`
+    tells those of each as soon as it is done.
 
     Closed before its end it leaves a frame that the next picture begins anew.
     """
     with turn:
         order.before()
-    plates = held = None
-    if order.catches:
-        order, plates, held = yield from _plates(order)
-    if order.take is None and order.given is None:  # slices hold all there is
-        asked = images_of(order.wanted, catcher.IMAGES if plates else ())
-        order = replace(order, settings=replace(order.settings, shows=frozenset(asked)))
-    parts, total = parts_of(order.snapshot), light_groups.Sum(order.snapshot.film)
-    for number, part in enumerate(parts):
-        own = str(number) if len(parts) > 1 else ""  # under which a slice holds the part's images
-        frame = yield from _part(order, part.snapshot, Share(number, len(parts), own, total))
-        with turn:
-            if order.take is not None:
-                held = slices.taken(frame, own, held)
-                order.take(held)
-            total.add(part, mean_images(order.renderer, frame, order.wanted, catcher.IMAGES if plates else ()))
-    if len(parts) > 1 and GLARE in order.wanted:
-        text = "glare is that of each light group for itself: without groups it is whole."
-        frame.ledger.notes += (Note("Light groups", text),)
-    return pixels_of(total, frame, order.wanted, plates), frame.ledger
-
-
-def _plates(order: Order) -> Generator[Progress | None, None, tuple[Order, tuple, slices.Slice | None]]:
-    """Draw the pictures with all and with shadow catchers alone; returns what is left to be drawn, what that is
-    composed with (both as catcher.Layer, and whether the film is transparent), and both in a slice, where one is taken.
-    The first tells how many samples all have, and has a third of a time limit."""
-    sliced = order.take is not None or order.given is not None
-    shows = None if sliced else frozenset(catcher.IMAGES)  # slices hold all there is
-    limit = order.settings.time_limit / PICTURES_OF_CATCHERS
-    found, held, settings = [], None, replace(order.settings, time_limit=limit, shows=shows)
-    for name, changed in ((catcher.ALL, catcher.over_nothing), (catcher.PLATE, catcher.catchers_alone)):
-        plate = order.of_scene(lambda one, changed=changed: _ungrouped(changed(one)), settings)
-        plate.shows, plate.notes, plate.started = False, (), time.perf_counter()
-        frame = yield from _part(plate, plate.snapshot, Share(name=name))
-        with turn:
-            if order.take is not None:
-                held = slices.taken(frame, name, held)
-            found.append(catcher.layer(mean_images(order.renderer, frame, [], catcher.IMAGES), plate.snapshot))
-        settings = replace(settings, time_limit=0.0, noise_threshold=0.0)
-        if not (sliced or settings.is_slice):
-            settings = replace(settings, samples=frame.samples_done)
-    transparent = order.snapshot.film.transparent
-    return order.of_scene(catcher.catchers_unseen, settings), (*found, transparent), held
-
-
-def _ungrouped(snapshot: Snapshot) -> Snapshot:
-    """The same as one picture, lit by all light groups."""
-    return replace(snapshot, film=replace(snapshot.film, light_groups=()))
+    takes = takes_of(order.snapshot, order.moments, order.catches, order.eyes)
+    wanted, more, held = order.wanted, catcher.IMAGES if order.catches else (), None
+    for eye, of_eye in groupby(takes, key=lambda take: take.eye):
+        picture, settings = Picture(), order.settings
+        started = order.started if eye == takes[0].eye else time.perf_counter()
+        for take in of_eye:
+            if not order.is_of_slices:
+                shows = more if take.is_plate else images_of(wanted, more)
+                settings = replace(settings, shows=frozenset(shows))
+            frame = yield from _drawn(_Shot(order, take, settings, len(takes), started, picture))
+            with turn:
+                if order.take is not None:
+                    held = slices.taken(frame, take.name, held)
+                picture.add(take, mean_images(order.renderer, frame, [] if take.is_plate else wanted, more))
+            if take.is_plate:  # all pictures of shadow catchers have as many samples as the first
+                settings = replace(settings, time_limit=0.0, noise_threshold=0.0)
+                if not (order.is_of_slices or settings.is_slice):
+                    settings = replace(settings, samples=frame.samples_done)
+        if picture.is_sum and GLARE in wanted:
+            text = "glare is that of each light group for itself: without groups it is whole."
+            frame.ledger.notes += (Note("Light groups", text),)
+        pixels = pixels_of(picture, frame, order)
+        yield Progress("Finishing", eye=eye, pixels=pixels, ledger=frame.ledger)
+    if order.take is not None:
+        order.take(held)
+    return pixels, frame.ledger
 
 
 @dataclass(frozen=True)
-class Share:
-    """Which of the parts is drawn of a picture that is lit by one light group after the other."""
+class _Shot:
+    """A take that is to be drawn, and its place among the others."""
 
-    number: int = 0
-    of: int = 1
-    name: str = ""  # under which slices hold it
-    before: light_groups.Sum | None = None  # the parts that are drawn
+    order: Order
+    take: Take
+    settings: Settings
+    of: int  # takes of all
+    started: float  # time.perf_counter() from which the time limit of the take's picture counts
+    before: Picture  # the takes that are drawn
 
     @property
-    def left(self) -> int:
-        """How many there are, with this one."""
-        return self.of - self.number
+    def limit(self) -> float:
+        """Seconds from `started` until the take has to end: each that is left has as much of what is left; 0: none."""
+        limit, passed = self.settings.time_limit, time.perf_counter() - self.started
+        return limit and passed + max(limit - passed, 0.0) / self.take.left
+
+    def left(self, samples: float, each: float | None) -> float | None:
+        """Seconds that are left, by what a sample takes and by the time limit; None before the first sample."""
+        if each is None:
+            return None
+        limit, left = self.settings.time_limit, (samples + TAIL) * each
+        return min(left, max(self.started + limit - time.perf_counter(), 0.0)) if limit else left
+
+    def share(self, samples: float, wanted: int) -> float:
+        """Of all that is drawn, what is done."""
+        return (self.take.number + samples / wanted) / self.of
 
 
-def _part(order: Order, snapshot: Snapshot, share: Share) -> Generator[Progress | None, None, Frame]:
-    """Draw one of the parts; returns its frame."""
-    renderer, settings = order.renderer, order.settings
-    before, steps, numbers = renderer.frame, _time_steps(order, share), None
-    if steps:
-        # What Denoise keeps for a picture that may end early counts the samples of one step.
+def _drawn(shot: _Shot) -> Generator[Progress | None, None, Frame]:
+    """Draw a take; returns its frame."""
+    order, take, settings, renderer = shot.order, shot.take, shot.settings, shot.order.renderer
+    before, snapshot, numbers, moments = renderer.frame, take.snapshot, None, []
+    if take.moments is not None and order.given is None:
+        moments = time_steps.shared_out(take.moments.snapshots, take.moments.steps, settings)
+        snapshot, numbers = moments[0].snapshot, moments[0].numbers
+        # What Denoise keeps for a picture that may end early counts the samples of one moment.
         settings = replace(settings, time_limit=0.0, noise_threshold=0.0)
-        snapshot, numbers = steps[0].snapshot, steps[0].numbers
+        renderer.forget()
     beginning = renderer.beginning(snapshot, settings, numbers)
     frame = None
     while frame is None:
@@ -174,103 +173,84 @@ def _part(order: Order, snapshot: Snapshot, share: Share) -> Generator[Progress 
             images.pool.trim()  # nobody asks for images of the old size again
     frame.ledger.times["sync"] = order.sync_seconds
     frame.ledger.notes += order.notes
-    if steps and order.settings.noise_threshold:
+    if moments and shot.settings.noise_threshold:
         text = "the noise threshold does not count where something moves: all samples are drawn."
         frame.ledger.notes += (Note("Motion blur", text),)
     if order.given is not None:
         with turn:
-            renderer.merge(frame, slices.images_of_part(order.given, share.name))
+            renderer.merge(frame, slices.images_of_part(order.given, take.name))
         yield None
+        return frame
+    if moments:
+        parts = time_steps.drawn(renderer, moments, settings, order.parts)
     else:
-        try:
-            yield from _samples_in_steps(order, steps, settings, share) if steps else _samples(order, frame, share)
-        except GeneratorExit:
+
+        def stop() -> None:
             with turn:
-                renderer.finish(renderer.frame or frame, ())  # what was done stands in the ledger
-            raise
-    if renderer.frame is not frame:  # the last of several, one for each time step
+                renderer.stop(frame)
+
+        parts = ((frame.samples_done, stop) for _ in order.parts(renderer, frame))
+    try:
+        yield from _samples(shot, frame, parts, bool(moments))
+    except GeneratorExit:
+        with turn:
+            renderer.finish(renderer.frame or frame, ())  # what was done stands in the ledger
+        raise
+    if renderer.frame is not frame:  # the last of several, one for each moment
         ledger, frame = frame.ledger, renderer.frame
         frame.ledger.times |= ledger.times
         frame.ledger.notes = ledger.notes
     return frame
 
 
-def _time_steps(order: Order, share: Share) -> list[time_steps.Step]:
-    """Those of a part of a picture with motion blur; none where nothing moves."""
-    if order.moments is None or order.given is not None:
-        return []
-    snapshots = [parts_of(one)[share.number].snapshot for one in order.moments.snapshots]
-    return time_steps.shared_out(snapshots, order.moments.steps, order.settings)
-
-
-def _samples_in_steps(
-    order: Order, steps: list[time_steps.Step], settings: Settings, share: Share
+def _samples(
+    shot: _Shot, frame: Frame, parts: Iterable[tuple[int, Callable[[], None]]], moves: bool
 ) -> Generator[Progress | None, None, None]:
-    """Draw all samples of a picture with motion blur, which is not shown while it grows."""
-    first, wanted, shown = time.perf_counter(), settings.samples_to_draw, -1
-    passed = first - order.started
-    limit = order.settings.time_limit and passed + max(order.settings.time_limit - passed, 0.0) / share.left
-    for done, stop in time_steps.drawn(order.renderer, steps, settings, order.parts):
-        if done == shown:
-            yield None
-            continue
-        shown = done
-        yield Progress(sentence(shown, wanted, None), (share.number + shown / wanted) / share.of)
-        if limit and shown:
-            with turn:
-                images.finish()
-            now = time.perf_counter()
-            # A step that follows learns in one more sample.
-            if shown < wanted and now - order.started + (2 + AFTER_LAST) * (now - first) / shown > limit:
-                stop()
-
-
-def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | None, None, None]:
-    """Draw all samples. With a time limit only as many as it allows: room is left for what follows the last."""
-    renderer, limit = order.renderer, frame.settings.time_limit
-    if limit:  # of what is left of it each part that is still to come has as much
-        passed = time.perf_counter() - order.started
-        limit = passed + max(limit - passed, 0.0) / share.left
+    """Draw all samples. With a time limit only as many as it allows: room is left for what follows the last. `parts`
+    tell how many are done, and what ends the take with these. A take in which something moves is not shown."""
+    take, renderer, limit = shot.take, shot.order.renderer, shot.limit
+    shows = shot.order.shows and not moves
     wanted, first, before = frame.settings.samples_to_draw, time.perf_counter(), frame.samples_done
     shown, showing, next_picture = -1, 0.0, first + SHOW_S
     pace, inside = SamplePace(first, wanted), Inside(frame, first)
-    meter = NoiseMeter(frame.settings.noise_threshold) if frame.settings.noise_threshold else None
-    for _ in order.parts(renderer, frame):
-        if frame.samples_done == shown:
-            news = inside.news(time.perf_counter()) if order.shows else None
+    meter = NoiseMeter(shot.settings.noise_threshold) if shot.settings.noise_threshold and not moves else None
+    for done, stop in parts:
+        if done == shown:
+            news = inside.news(time.perf_counter()) if shows else None
             if news is not None:
-                left = left_of(order, share.left * wanted - inside.done, pace.each or inside.each)
+                left = shot.left(take.left * wanted - inside.done, pace.each or inside.each)
                 told = sentence(shown, wanted, left, news)
-                news = Progress(told, (share.number + inside.done / wanted) / share.of, left=left)
+                news = Progress(told, shot.share(inside.done, wanted), left=left, eye=take.eye)
             yield news
             continue
-        shown = frame.samples_done
+        shown = done
         picture, now = None, time.perf_counter()
         # The last picture comes with its passes at once; a first one is worth more than its time.
-        if order.shows and before < shown < wanted and (now >= next_picture or shown == before + 1):
+        if shows and not take.is_plate and before < shown < wanted and (now >= next_picture or shown == before + 1):
             with turn:
                 picture = picture_of(renderer, frame)
-            if share.number:
-                picture[..., :3] += share.before.images[COMBINED][..., :3]
+            if COMBINED in shot.before.images:
+                picture[..., :3] += shot.before.images[COMBINED][..., :3]
             took = time.perf_counter() - now
             showing += took
             next_picture = now + took + max(SHOW_S, took / SHOW_SHARE)
         pace.learn(shown - before, time.perf_counter())
-        left = left_of(order, share.left * wanted - shown, pace.each or inside.each) if order.shows else None
-        yield Progress(sentence(shown, wanted, left), (share.number + shown / wanted) / share.of, picture, left)
+        left = shot.left(take.left * wanted - shown, pace.each or inside.each) if shows else None
+        yield Progress(sentence(shown, wanted, left), shot.share(shown, wanted), picture, left, take.eye)
         if meter is not None and shown < wanted:
             with turn:
-                if meter.look(frame):
-                    renderer.stop(frame)
-                    return
-        if limit and shown > before:
+                enough = meter.look(frame)
+            if enough:
+                stop()
+                return
+        if limit and before < shown < wanted:
             with turn:
                 images.finish()
-                now = time.perf_counter()
-                each = (now - first) / (shown - before)
-                if shown < wanted and now - order.started + (1 + AFTER_LAST) * each > limit:
-                    renderer.stop(frame)
-                    return
+            now = time.perf_counter()
+            # A moment that follows learns in one more sample.
+            if now - shot.started + (1 + moves + AFTER_LAST) * (now - first) / (shown - before) > limit:
+                stop()
+                return
 
 
 class SamplePace:
@@ -325,15 +305,6 @@ class Inside:
         return f"compiling shaders for {self._frame.at}" if compiles else self._frame.at
 
 
-def left_of(order: Order, samples: float, each: float | None) -> float | None:
-    """Seconds that are left, by what a sample takes and by the time limit; None before the first sample."""
-    if each is None:
-        return None
-    limit = order.settings.time_limit
-    left = (samples + TAIL) * each
-    return min(left, max(order.started + limit - time.perf_counter(), 0.0)) if limit else left
-
-
 def sentence(done: int, wanted: int, left: float | None, doing: str = "") -> str:
     """How far a render is, in the words that render farms read, and what it is doing."""
     text = f"Rendering {done} / {wanted} samples"
@@ -359,7 +330,7 @@ def picture_of(renderer: Renderer, frame: Frame) -> np.ndarray:
 def images_of(wanted: list[RenderPass], more: tuple[str, ...] = ()) -> set[str]:
     """Names of a frame's images that the picture and these passes are made from."""
     sources = {COMBINED, *more, *(name for asked in wanted for name in asked.images)} - {CATCHER.source}
-    return light_groups.frame_images(sources)
+    return frame_images(sources)
 
 
 def _noisy(frame: Frame, combined: np.ndarray) -> np.ndarray:
@@ -416,19 +387,13 @@ def _without_negative(arrays: dict[str, np.ndarray], exposure: float) -> None:
     arrays[COMBINED][..., :3] += exposure * added
 
 
-def pixels_of(
-    total: light_groups.Sum, frame: Frame, wanted: list[RenderPass], plates: tuple | None = None
-) -> dict[str, np.ndarray]:
-    """Pass pixels by Blender's name, (H, W, channels) float32."""
-    arrays = total.finished({name for asked in wanted for name in asked.images})
+def pixels_of(picture: Picture, frame: Frame, order: Order) -> Pixels:
+    """The passes of an eye's picture, of which this take was the last."""
+    wanted = order.wanted
+    arrays = picture.with_black({name for asked in wanted for name in asked.images})
     if _below_zero(arrays) and not _may_have_negative_light(frame):
         _without_negative(arrays, frame.snapshot.film.exposure)
-    arrays[CATCHER.source] = np.ones_like(arrays[COMBINED][..., :3])
-    if plates:
-        everything, plate, transparent = plates
-        things = catcher.layer(arrays, frame.snapshot)
-        arrays[CATCHER.source] = change = catcher.change_of(everything, plate, things, transparent)
-        arrays[COMBINED] = catcher.composed(change, everything, things, transparent, CATCHER in wanted)
+    arrays[CATCHER.source] = picture.catch(arrays, frame.snapshot, order.snapshot.film.transparent, CATCHER in wanted)
     arrays[CAMERA_AXES] = frame.snapshot.camera.matrix[:3, :3] * (1.0, 1.0, -1.0)
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays[COMBINED], **pixels}

@@ -50,6 +50,9 @@ ROOMS = {
     "frame": Room(rooms=BELOW_FRAME, modules=("numpy",)),
     "surfaces": Room(rooms=(*BELOW_FRAME, "frame"), modules=("numpy",)),
     "film": Room(rooms=(*BELOW_FRAME, "frame", "surfaces"), modules=("numpy",)),
+    "film.takes": Room(
+        rooms=("frame", "film", "snapshot.scene", "snapshot.light_groups", "snapshot.shutter"), modules=("numpy",)
+    ),
     "lighting": Room(rooms=(*BELOW_FRAME, "frame", "surfaces", "film"), modules=("numpy",)),
     "techniques": Room(rooms=BELOW_TECHNIQUES, modules=("numpy",)),
     "compare": Room(rooms=BELOW_COMPARE, modules=("numpy",), optional=("flip_evaluator", "matplotlib")),

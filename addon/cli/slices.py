@@ -149,7 +149,7 @@ def _shown(found: slices.Slice) -> np.ndarray:
     """The mean of a slice's light, for viewers."""
     light, covered = [], 1.0
     for name, pixels in found.images.items():
-        if slices.part_of(name) in catcher.PARTS:
+        if slices.part_of(name) in catcher.PLATES:
             continue
         name = name.removeprefix(f"{slices.part_of(name)}:")
         if name.startswith(("film.", "radiance.")) and name not in slices.FIRST:

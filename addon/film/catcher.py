@@ -34,7 +34,7 @@ from ..snapshot.scene import Snapshot
 
 COMBINED, WORLD = "film.combined", "radiance.environment"
 IMAGES = (COMBINED, WORLD)  # what is read of each of the three
-ALL, PLATE = PARTS = ("all", "plate")  # under which slices hold the first two
+ALL, PLATE = "all", "plate"  # under which slices hold the first two
 SURE = 0.5  # share of a pixel from which on its own light is enough to know what has changed
 LEAST = 0.01  # share of a pixel below which nothing is known of what covers it
 
@@ -57,6 +57,9 @@ def catchers_unseen(snapshot: Snapshot) -> Snapshot:
         for one in snapshot.instances
     )
     return replace(over_nothing(snapshot), instances=tuple(instances))
+
+
+PLATES = {ALL: over_nothing, PLATE: catchers_alone}  # in the order in which they are drawn
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class Slice:
 
 
 def taken(frame: Frame, part: str = "", before: Slice | None = None) -> Slice:
-    """What a merge needs of a frame whose samples are drawn: of the `part` of a picture, beside those before it."""
+    """What a merge needs of a frame whose samples are drawn: of the `part` of a picture, a take, beside those before it."""
     wanted = {frame.held.shown.get(name, name) for name in frame.held.sums} | set(FIRST) | frame.read_last
     wanted |= {name for name in frame.images if name.endswith(HALF) or name.startswith(RANKED)}
     read = {joined(part, name): images.read(frame.images[name]) for name in sorted(wanted) if name in frame.images}
@@ -93,8 +93,7 @@ def merged(slices: Sequence[Slice]) -> dict[str, np.ndarray]:
     return found
 
 
-# A picture of several light groups is drawn in parts, one for each (snapshot/light_groups.py), and one with shadow
-# catchers needs two more (film/catcher.py); a slice holds the images of all, those of a part under its number or name.
+# A slice holds the images of all takes of a picture (film/takes.py), those of one of several under its name.
 def joined(part: str, name: str) -> str:
     return f"{part}:{name}" if part else name
 

@@ -8,8 +8,8 @@ emits in their trees is set to black.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,55 +31,55 @@ _SHINING = {
 _BLACK = "No light"  # a node that takes the place of a colour where a shader belongs, which is an emission
 
 
-@dataclass(frozen=True)
-class Part:
-    """A share of the scene's light: that of a group of the view layer, or REST."""
-
-    group: str
-    snapshot: Snapshot
-    world: bool  # whether the world is in it
-
-
-def parts_of(snapshot: Snapshot) -> list[Part]:
-    """Parts that together are the picture: one without a group where the view layer lists none. Groups in which nothing
-    shines have no part."""
-    groups = snapshot.film.light_groups
-    if not groups:
-        return [Part(REST, snapshot, True)]
-    parts = [_part(snapshot, group, groups) for group in (*groups, REST)]
-    found = [part for part in parts if part is not None]
-    return found or [Part(REST, snapshot, True)]
+def groups_of(snapshots: Sequence[Snapshot]) -> list[str]:
+    """Groups, REST among them, that together light the picture at all of these moments: REST alone where the view layer
+    lists none. Those in which nothing shines at any of them are left out."""
+    groups = snapshots[0].film.light_groups
+    found = [group for group in (*groups, REST) if groups and any(_gives_light(one, group) for one in snapshots)]
+    return found or [REST]
 
 
-def _part(snapshot: Snapshot, group: str, groups: tuple[str, ...]) -> Part | None:
-    def belongs(one) -> bool:
-        return (one.group if one.group in groups else REST) == group
-
-    lights = tuple(light for light in snapshot.lights if belongs(light))
-    world = belongs(snapshot.world)
+def lit_by(snapshot: Snapshot, group: str) -> Snapshot:
+    """The same scene, lit by a group alone; itself where the view layer lists none."""
+    if not snapshot.film.light_groups:
+        return snapshot
     dark = _Dark(snapshot.materials)
     instances = tuple(
-        one if belongs(one) else dark.instance(one, tuple(dark.material(k) for k in one.materials))
+        one if is_of(one, group, snapshot) else dark.instance(one, tuple(dark.material(k) for k in one.materials))
         for one in snapshot.instances
     )
     volumes = tuple(
-        one if belongs(one) else replace(one, material=dark.material(one.material)) for one in snapshot.volumes
+        one if is_of(one, group, snapshot) else replace(one, material=dark.material(one.material))
+        for one in snapshot.volumes
     )
-    shown = {k for one in snapshot.instances if belongs(one) for k in one.materials}
-    shown |= {one.material for one in snapshot.volumes if belongs(one)}
-    if not lights and not (world and _shines(snapshot)) and not any(dark.shines(k) for k in shown):
-        return None
     lit = snapshot.world
-    if not world:
+    if not is_of(lit, group, snapshot):
         volume = None if lit.volume is None else without_light(lit.volume)
         medium = lit.medium and replace(lit.medium, emission=np.zeros(3), glow=0.0)
         lit = replace(
             lit, color=np.zeros(3), image=None, mapping=np.eye(3, 4), graph=None, volume=volume, medium=medium
         )
-    part = replace(
+    lights = tuple(light for light in snapshot.lights if is_of(light, group, snapshot))
+    return replace(
         snapshot, lights=lights, world=lit, instances=instances, volumes=volumes, materials=tuple(dark.materials)
     )
-    return Part(group, part, world)
+
+
+def is_of(one, group: str, snapshot: Snapshot) -> bool:
+    """Whether a lamp, an object, a volume or the world is of a group; REST: of none that the view layer lists."""
+    return (one.group if one.group in snapshot.film.light_groups else REST) == group
+
+
+def _gives_light(snapshot: Snapshot, group: str) -> bool:
+    """Whether anything of a group shines."""
+    if any(is_of(light, group, snapshot) for light in snapshot.lights):
+        return True
+    if is_of(snapshot.world, group, snapshot) and _shines(snapshot):
+        return True
+    shown = {k for one in snapshot.instances if is_of(one, group, snapshot) for k in one.materials}
+    shown |= {one.material for one in snapshot.volumes if is_of(one, group, snapshot)}
+    graphs = [snapshot.materials[k].graph for k in shown]
+    return any(without_light(graph) is not graph for graph in graphs)
 
 
 def _shines(snapshot: Snapshot) -> bool:
@@ -105,9 +105,6 @@ class _Dark:
             if graph is not material.graph:
                 self.materials.append(replace(material, key=f"{material.key} dark", graph=graph))
         return self._dark[k]
-
-    def shines(self, k: int) -> bool:
-        return without_light(self.materials[k].graph) is not self.materials[k].graph
 
     @staticmethod
     def instance(one, materials: tuple[int, ...]):

@@ -48,7 +48,7 @@ class Catchers:
     @property
     def known(self) -> bool:
         """Whether all three pictures are there."""
-        return len(self._lit) == len(catcher.PARTS)
+        return len(self._lit) == len(catcher.PLATES)
 
     def look_at(self, scene: Snapshot | None, same: bool) -> bool:
         """The view shows this scene; None: one without catchers, or a pass in the picture's place. `same`: `things`
@@ -81,7 +81,7 @@ class Catchers:
         self._renderer = renderer = Renderer(techniques.make_registry)
         renderer.publishes = False
         left_out = set(passes.left_out)  # of `things`, whose ledger is still to be published
-        for name, changed in ((catcher.ALL, catcher.over_nothing), (catcher.PLATE, catcher.catchers_alone)):
+        for name, changed in catcher.PLATES.items():
             beginning, frame = renderer.beginning(changed(self.scene), settings), None
             while frame is None:
                 try:
@@ -105,7 +105,7 @@ class Catchers:
         """Into the target the picture of `things`, which is shown as `seen`, with what is known of the catchers."""
         things, known = frame.images[catcher.COMBINED], self.known
         has_world = catcher.WORLD in frame.images
-        lit = self._lit if known else dict.fromkeys(catcher.PARTS, things)
+        lit = self._lit if known else dict.fromkeys(catcher.PLATES, things)
         passes.fullscreen(
             COMPOSE,
             target,
