@@ -99,9 +99,9 @@ def program(count: int, pixels: int, dimmed: tuple[int, ...] = ()) -> Program:
     image `through` then holds what they let pass."""
     each = range(count)
     seen = [_SEEN[kind] for kind in dimmed or (CLEAR,) * count]
-    return passes.fullscreen_program(
+    return passes.program_of_pixels(
         f"film filter, {count} images, {2 * pixels + 1} pixels wide",
-        "film/filter.frag.glsl",
+        "film/filter.glsl",
         textures=(*(("RGBA32F", f"seen_{i}") for i in each), *((("RGBA32F", "through"),) if dimmed else ())),
         constants=CONSTANTS,
         defines=(
@@ -134,10 +134,9 @@ def add(
     for part in range(count):
         names = tuple(seen)[part::count]
         dimmed = () if through is None else tuple(_dimmed(name, WORLD_SEEN in seen) for name in names)
-        passes.fullscreen(
+        passes.add_pixels(
             program(len(names), reach(width), dimmed),
             frame.target(*names),
-            blend="ADDITIVE_PREMULT",
             textures={
                 **{f"seen_{i}": seen[name] for i, name in enumerate(names)},
                 **({"through": through} if dimmed else {}),

@@ -7,7 +7,8 @@ whatever else the machine does can only add.
 
 Kernels are those of the choices that ask: shadow rays between towers (trace/hierarchy.glsl, the same code as pictures
 run), small triangles and whole quads into a depth map, views with nothing in them, passes of one pixel, texels far
-apart from a texture and from an image, and edges of a shadow. What they leave out: caches that a whole picture fills,
+apart from a texture and from an image, edges of a shadow, and steps of arithmetic in a fragment and in a compute
+program. What they leave out: caches that a whole picture fills,
 divergence of scenes with deep trees, alpha. They are good for choices between methods that differ by a factor, not for
 forecasts.
 """
@@ -38,6 +39,7 @@ TRIANGLES = 4096  # of the hierarchy and of the mesh
 VIEWS, BOXES = 8, 64
 READS, READ_SIDE = 64, 512
 EDGES = 32  # of a shadow
+STEPS = 64  # of arithmetic
 DIGITS = 2  # to which figures are rounded, so that noise turns no choice
 
 RAY = passes.fullscreen_program(
@@ -72,6 +74,10 @@ EDGE = passes.fullscreen_program(
     "probe of edges", "probe/edges.frag.glsl", textures=(("RGBA32F", "edge_records"), ("RGBA32F", "light_pattern")),
     constants=(("INT", "side"),), outputs=(("VEC4", "out_color"),), defines=(("EDGES", str(EDGES)),),
 )  # fmt: skip
+
+STEP = passes.program_of_pixels(
+    "probe of steps", "probe/steps.glsl", outputs=(("VEC4", "out_color"),), defines=(("STEPS", str(STEPS)),)
+)
 
 
 def folder() -> Path:
@@ -111,6 +117,7 @@ def measure() -> Device:
         "view": _views(target, wait),
     }
     found["edge"] = _edges(target, wait)
+    found["fragment"], found["compute"] = _steps(target, wait)
     found["render_pass"], found["python"] = _passes(target, wait)
     device.measured_s = time.perf_counter() - started
     return Device(**{field.name: _rounded(1e9 * found[field.name]) for field in fields(Device)})
@@ -245,6 +252,21 @@ def _edges(target: images.Target, wait: float) -> float:
         passes.fullscreen(EDGE, target, viewport=(0, 0, side, side), textures=textures, constants={"side": side})
 
     return _each(work, _sides(), lambda side: side * side * EDGES, wait)
+
+
+def _steps(target: images.Target, wait: float) -> tuple[float, float]:
+    """Of a pixel, by a fragment and by a compute program of the same body."""
+    computed = passes.computed(STEP, (target.colors[0].format,))
+
+    def draw(side: int) -> None:
+        passes.fullscreen(STEP, target, viewport=(0, 0, side, side))
+
+    def compute(side: int) -> None:
+        passes.compute(computed, (side, side), images={"to_out_color": target.colors[0]})
+
+    # Large from the start: software drivers wait before each dispatch.
+    drawn, found = (_each(work, _sides()[3:], lambda side: side * side, wait) for work in (draw, compute))
+    return drawn, found
 
 
 def _passes(target: images.Target, wait: float) -> tuple[float, float]:

@@ -45,7 +45,7 @@ class Slice:
 
 
 def taken(frame: Frame, part: str = "", before: Slice | None = None) -> Slice:
-    """What a merge needs of a frame whose samples are drawn: of the `part` of a picture, a take, beside those before it."""
+    """What a merge needs of a frame whose samples are drawn: of the `part` of a picture, beside those before it."""
     wanted = {frame.held.shown.get(name, name) for name in frame.held.sums} | set(FIRST) | frame.read_last
     wanted |= {name for name in frame.images if name.endswith(HALF) or name.startswith(RANKED)}
     read = {joined(part, name): images.read(frame.images[name]) for name in sorted(wanted) if name in frame.images}

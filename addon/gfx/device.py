@@ -15,10 +15,11 @@ import tempfile
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-VERSION = 2  # of the kernels: figures of others are measured anew
+VERSION = 3  # of the kernels: figures of others are measured anew
 MOST_KEPT = 16  # drivers
 MOST_BYTES = 1 << 20  # of a file of figures: they are some hundred a driver
 LOAD_GAIN = 0.7  # of a fetch's time, below which loads are worth the bindings that they take
+COMPUTE_GAIN = 0.5  # of a fragment's time, below which compute programs are worth what they wait for
 VARIABLE = "CANDELA_DEVICE"
 
 
@@ -35,20 +36,23 @@ class Device:
     fetch: float  # of a texel far from that before, from a texture
     load: float  # the same from an image
     edge: float  # of a shadow, asked by a pixel for 64 points of a light
+    fragment: float  # of 64 steps of arithmetic of a pixel that is drawn
+    compute: float  # the same of a thread of a compute program
 
     def lines(self) -> list[str]:
         """For the panel and the terminal."""
         drawn = f"triangle {_time(self.triangle)}, depth texel {_time(self.texel)}, view {_time(self.view)}"
         asked = f"pass {_time(self.render_pass)}, of it Python and driver {_time(self.python)}"
         read = f"texel fetched {_time(self.fetch)}, loaded {_time(self.load)}; edge of a shadow {_time(self.edge)}"
-        return [f"ray {_time(20 * self.ray_level)} (a million triangles), {drawn}", f"{asked}; {read}"]
+        steps = f"64 steps of arithmetic drawn {_time(self.fragment)}, computed {_time(self.compute)}"
+        return [f"ray {_time(20 * self.ray_level)} (a million triangles), {drawn}", f"{asked}; {read}", steps]
 
 
 # Made up for tests, near to what two threads of llvmpipe and a fast card do: whole renders of 16 samples of direct
 # light, by maps and by rays; of cards only what others publish.
 MADE_UP = {
-    "software": Device(8.0, 130.0, 20.0, 8e5, 5e5, 3e5, 8.0, 2.5, 20.0),
-    "card": Device(0.15, 0.3, 0.02, 5e3, 3e4, 2.5e4, 0.01, 0.012, 0.05),
+    "software": Device(8.0, 130.0, 20.0, 8e5, 5e5, 3e5, 8.0, 2.5, 20.0, 80.0, 80.0),
+    "card": Device(0.15, 0.3, 0.02, 5e3, 3e4, 2.5e4, 0.01, 0.012, 0.05, 0.01, 0.01),
 }
 
 _current: Device | None = None
@@ -64,6 +68,12 @@ def loads_beat_fetches() -> bool:
     """Whether shaders read texels faster from images than from textures: with Mesa's software rasteriser in down to a
     quarter of the time, where neighbours ask for texels far apart."""
     return current().load < LOAD_GAIN * current().fetch
+
+
+def computes_beat_fragments() -> bool:
+    """Whether compute programs run faster than full-screen passes, by more than a dispatch costs: on cards for
+    computing, of which few units draw, in a twentieth of the time."""
+    return current().compute < COMPUTE_GAIN * current().fragment
 
 
 def known() -> bool:

@@ -10,6 +10,7 @@ import gpu
 import numpy as np
 
 from .context import on_leave, on_release, overtakes_draws
+from .device import computes_beat_fragments
 from .geometry import Batch, vertex_buffer
 from .images import Image, Target, borrowed, finish, lasts
 from .library import FULLSCREEN_VERTEX, MOST_TEXTURES, Program, Shader, get
@@ -22,6 +23,8 @@ QUAD_INPUTS = FULLSCREEN_INPUTS
 # Programs and the names of images beside those that they read, for which they have no room: since it was emptied last.
 left_out: set[tuple[str, str]] = set()
 
+OF_PIXELS = "pixels/"  # sources of fragment programs that call a body for their pixel begin so
+
 _triangle: list[gpu.types.GPUBatch] = []
 _quad: list[gpu.types.GPUBatch] = []
 
@@ -32,6 +35,41 @@ def fullscreen_program(name: str, fragment: str, **declared) -> Program:
         name=name, vertex=FULLSCREEN_VERTEX, fragment=fragment, inputs=FULLSCREEN_INPUTS, varyings=FULLSCREEN_VARYINGS,
         **declared,
     )  # fmt: skip
+
+
+def program_of_pixels(name: str, body: str, **declared) -> Program:
+    """A program for `add_pixels`: the source `body` defines `void run(ivec2 pixel)`, which sets all outputs."""
+    main = f'#include "{body}"\n\nvoid main()\n{{\n  run(ivec2(gl_FragCoord.xy));\n}}\n'
+    return fullscreen_program(name, OF_PIXELS + body, snippets=((OF_PIXELS + body, main),), **declared)
+
+
+@lru_cache(maxsize=256)
+def computed(program: Program, formats: tuple[str, ...]) -> Program:
+    """The same program of pixels as a compute program, which adds its outputs to images of these formats."""
+    body = program.fragment.removeprefix(OF_PIXELS)
+    names = [name for _, name in program.outputs]
+    own = "".join(f"vec4 {name};\n" for name in names)
+    added = "".join(f"  imageStore(to_{name}, pixel, imageLoad(to_{name}, pixel) + {name});\n" for name in names)
+    main = (
+        f'{own}#include "{body}"\n\nvoid main()\n{{\n  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);\n'
+        f"  if (any(greaterThanEqual(pixel, imageSize(to_{names[0]})))) {{\n    return;\n  }}\n"
+        f"  run(pixel);\n{added}}}\n"
+    )
+    return Program(
+        name=f"{program.name}, computed", compute="computed/" + body, snippets=(("computed/" + body, main),),
+        images=tuple((f"to_{name}", kind, "FLOAT_2D", "READ_WRITE") for name, kind in zip(names, formats)),
+        textures=program.textures, constants=program.constants, blocks=program.blocks, defines=program.defines,
+    )  # fmt: skip
+
+
+def add_pixels(program: Program, target: Target, **bindings) -> None:
+    """Add what a program of pixels (`program_of_pixels`) gives to a target's images: by fragments or by a compute
+    program of the same body, whichever this device runs faster. A card for computing may have few units that draw."""
+    if not computes_beat_fragments():
+        fullscreen(program, target, blend="ADDITIVE_PREMULT", **bindings)
+        return
+    images = {f"to_{name}": image for (_, name), image in zip(program.outputs, target.colors)}
+    compute(computed(program, tuple(image.format for image in target.colors)), target.size, images=images, **bindings)
 
 
 COPY = fullscreen_program(

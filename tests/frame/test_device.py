@@ -3,11 +3,12 @@
 import json
 from dataclasses import asdict, replace
 
+import numpy as np
 import pytest
 
 from addon.film import point_costs
 from addon.frame import device_probe
-from addon.gfx import context, device
+from addon.gfx import context, device, passes
 from addon.lighting import visibility
 from addon.snapshot import SnapshotCache, take
 from addon.ui import preferences
@@ -54,6 +55,23 @@ def test_a_choice_differs_between_two_devices_and_the_ledger_says_why(room):
     assert "rays, because" in said["tracer"] and "maps, because" in said["rasteriser"]
     assert all(sentence.endswith(" here") and " ms against " in sentence for sentence in said.values())
     assert said["tracer"] in room.ledger.text() or said["rasteriser"] in room.ledger.text()
+
+
+def test_pixels_are_drawn_or_computed_alike_as_the_device_says(room, monkeypatch):
+    """The film filter, and what a picture with it is, by fragments and by compute programs of the same body."""
+    dispatched, found = [], {}
+    own = passes.compute
+    monkeypatch.setattr(
+        passes, "compute", lambda program, *a, **b: dispatched.append(program.name) or own(program, *a, **b)
+    )
+    for name, compute in (("drawn", SOFTWARE.fragment), ("computed", 0.1 * SOFTWARE.fragment)):
+        device.use(replace(SOFTWARE, compute=compute))
+        dispatched.clear()
+        room.renderer.forget()
+        found[name] = room.render(2, (37, 23))
+        assert any("film filter" in program for program in dispatched) == (name == "computed")
+    for name, image in found["drawn"].items():
+        np.testing.assert_allclose(found["computed"][name], image, rtol=1e-5, atol=1e-6, err_msg=name)
 
 
 def test_the_plan_foresees_the_same_choice(room):

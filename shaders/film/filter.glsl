@@ -8,9 +8,8 @@ vec4 film_dimmed(vec4 seen, vec3 passing)
   return vec4(seen.rgb * passing, 1.0 - (1.0 - seen.a) * dot(passing, vec3(1.0 / 3.0)));
 }
 
-void main()
+void run(ivec2 pixel)
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = seen_0_size();
   BEGIN_ALL
 #if PIXELS == 0
