@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import addon
+from addon.gfx import passes
 from addon.gfx.interface import answered, asked_by
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
@@ -92,4 +93,6 @@ def programs() -> list[Program]:
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)
         made += [materials._surface_program(with_file), materials._caster_program(with_file)]
         made += [materials._emission_program(with_file), materials._opacity_program(with_file)]
+    of_pixels = [one for one in made if one.fragment.startswith(passes.OF_PIXELS)]
+    made += [passes.computed(one, ("RGBA32F",) * len(one.outputs)) for one in of_pixels]
     return sorted(dict.fromkeys(made), key=lambda program: (program.name, program.fragment, program.compute))
