@@ -1,9 +1,10 @@
 """What light below surfaces costs, painted maps and thin parts: `python -m bench subsurface_costs --page`.
 
-Five parts for docs/subsurface.md: the cost of a picture by points, by range in pixels, by resolution and by number of
+Six parts for docs/subsurface.md: the cost of a picture by points, by range in pixels, by resolution and by number of
 materials, beside diffuse ones; three painted scenes (a face with tinted cheeks that are soft or sharp, veins, a candle
 with an opaque wick) with maps and without; walks through slabs from .25 to 8 mean free paths thick that are lit from
-behind, beside Cycles; and closed forms of slabs. Seconds are medians of renders of 4 samples after one that compiled.
+behind, beside Cycles; closed forms of slabs; and dipole splats (subsurface_splats.py). Seconds are medians of renders
+of 4 samples after one that compiled.
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from . import markdown, subsurface
+from .subsurface_splats import splats
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "subsurface.md"
 COMMAND = "python -m bench subsurface_costs --page"
 SIZE, SAMPLES, REPEATS, ROUNDS = (96, 96), 4, 2, 4
-PARTS = ("cost", "painted", "thin", "slabs")
+PARTS = ("cost", "painted", "thin", "slabs", "splats")
 MAP = 256  # pixels of a side of painted maps
 
 
@@ -35,7 +37,14 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     for name in options.parts:
-        table = {"cost": costs, "painted": lambda: painted(options.pictures), "thin": thin, "slabs": slabs}[name]()
+        made = {
+            "cost": costs,
+            "painted": lambda: painted(options.pictures),
+            "thin": thin,
+            "slabs": slabs,
+            "splats": splats,
+        }
+        table = made[name]()
         print(table, flush=True)
         if options.page:
             markdown.put_between(PAGE, f"{COMMAND} --parts {name}", table)

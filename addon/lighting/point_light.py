@@ -64,14 +64,15 @@ class PointLight:
 
     def add(
         self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target, number: int | None = None,
-        instances: images.Image | None = None,
+        instances: images.Image | None = None, without: frozenset[int] = frozenset(),
     ) -> tuple[int, int]:  # fmt: skip
         """Add this sample's diffuse and glossy direct light, or that of sample `number`, on `surfaces` (by the names of
         SURFACE_IMAGES) to the two images of `target`. `instances`: of which instance each point is (z: its row in the
-        geometry's image), for lights that leave out objects. Returns the numbers of passes and of rays a point."""
+        geometry's image), for lights that leave out objects. `without`: ids of lamps that are left out. Returns the
+        numbers of passes and of rays a point."""
         number = frame.sample if number is None else number
         by_blockers: dict[frozenset[int], list[np.ndarray]] = {}  # that let light pass
-        for passing, row in (*self._lamps(frame, number), *self._emitted(frame, number)):
+        for passing, row in (*self._lamps(frame, number, without), *self._emitted(frame, number)):
             by_blockers.setdefault(passing, []).append(row)
         by_blockers[frozenset()] = by_blockers.get(frozenset(), []) + list(self._world(frame, number))
         rows = [row for some in by_blockers.values() for row in some]
@@ -101,14 +102,16 @@ class PointLight:
         """On a source in a sample."""
         return max(self._few // frame.settings.samples, least) if self._each is None else self._each
 
-    def _lamps(self, frame: Frame, sample_number: int) -> Iterator[tuple[frozenset[int], np.ndarray]]:
+    def _lamps(
+        self, frame: Frame, sample_number: int, without: frozenset[int] = frozenset()
+    ) -> Iterator[tuple[frozenset[int], np.ndarray]]:
         """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power. With each the
         groups of blockers that let its light pass."""
         settings = frame.settings
         emitters = [
             one
             for one in frame.emitters
-            if one.flags & lights.DIFFUSE_FLAG and (one.light.bounces or not self._reflected)
+            if one.flags & lights.DIFFUSE_FLAG and (one.light.bounces or not self._reflected) and id(one) not in without
         ]
         chosen = [(emitter, 1.0) for emitter in emitters]
         if len(chosen) > FEW_POINTS:

@@ -40,10 +40,11 @@ from ..frame.technique import MATERIAL, Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import diffusion
-from ..lighting import leaving_light, repeated_light, walked_light
+from ..lighting import leaving_light, repeated_light, splatted_light, walked_light
 from ..lighting.asked import asked
 from ..lighting.leaving_light import LeavingLight, LeavingService
 from ..lighting.point_light import LIGHTING, PointLight
+from ..lighting.splatted_light import Splats
 from ..lighting.visibility import RAYS, ray_bindings
 from ..materials import translucency
 from ..materials.compiler import may_scatter, may_walk
@@ -51,6 +52,7 @@ from ..scene import acceleration
 from ..scene.materials import SCATTER_IMAGES
 from ..scene.scatter_points import RANGE, ROW, ScatterPoints
 from ..scene.view import VIEW
+from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACES, draw_scatter
 from ..surfaces.scatter_means import ScatterMeans
@@ -106,6 +108,7 @@ CHORD = passes.fullscreen_program(
     outputs=(("VEC4", "out_shape"),),
 )
 LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
+PROFILES, SPLATS = "PROFILES", "SPLATS"
 
 
 class ImageSpaceSubsurface(Technique):
@@ -113,6 +116,19 @@ class ImageSpaceSubsurface(Technique):
     label = "Image-space subsurface"
     fills = ("subsurface",)
     params = (
+        Param(
+            "form", "Form", PROFILES,
+            "How light below the surface is summed: by Blender's methods, or by the dipole as in the source",
+            items=(
+                (PROFILES, "Profiles and Walks", 0, "Pixels, points of the mesh and random walks: as Cycles"),
+                (SPLATS, "Dipole Splats", 1, "Squares from each lamp's view, weighted by the dipole (Shah 2007)"),
+            ),
+        ),
+        Param(
+            "grid", "Splat Grid", 64,
+            "With Dipole Splats: texels along each side of a lamp's view of the objects",
+            8, 1024, draft=32,
+        ),
         Param(
             "points", "Points", 4096,
             "Maximum number of points that are lit in each sample, on all objects with subsurface scattering",
@@ -156,6 +172,7 @@ class ImageSpaceSubsurface(Technique):
     def __init__(self):
         self.points = ScatterPoints()
         self._light = PointLight("subsurface")
+        self._splats = Splats()
         self._lobes: images.Image | None = None
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
@@ -171,7 +188,14 @@ class ImageSpaceSubsurface(Technique):
         return acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return GATHER, APPLY, CHORD, LIGHTING, *walked_light.PROGRAMS, *leaving_light.PROGRAMS
+        form = (
+            splatted_light.PROGRAMS if self._splatted(settings, snapshot) else (GATHER, APPLY, *walked_light.PROGRAMS)
+        )
+        return CHORD, LIGHTING, *form, *leaving_light.PROGRAMS
+
+    def _splatted(self, settings: Settings, snapshot: Snapshot) -> bool:
+        """Whether light is summed by splats: not for panoramic cameras, whose lines are bent."""
+        return settings.get(self, "form") == SPLATS and bends_lines(snapshot) is None
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._materials or frame.receivers is None or not len(frame.receivers.distance):
@@ -181,6 +205,12 @@ class ImageSpaceSubsurface(Technique):
         # Light at other points of the film is taken from pixels: repeated, it would be light that enters there.
         repeated_light.forbid(frame)
         draw_scatter(frame, self, frame.target(*IMAGES), self.points.table, self._materials)
+        if self._splatted(frame.settings, frame.snapshot):
+            frame.target(CHOICE).clear()
+            yield
+            self._splats.draw(frame, self, self.points, self._light)
+            self._direct = None
+            return
         lit = self._lit_points(frame) if self.points.rows else None
         self._direct = None
         yield
@@ -204,6 +234,10 @@ class ImageSpaceSubsurface(Technique):
         self._whole = [images.Target((images.pool.take(*frame.size, "RGBA32F"),)) for _ in range(2)]
         self._whole[0].clear()
         self._light.begin(frame)
+        if self._splatted(frame.settings, frame.snapshot):
+            self._splats.begin(frame, self.points, self._materials)
+        elif frame.settings.get(self, "form") == SPLATS:
+            frame.account.chose(self, "form", f"{PROFILES}, because {bends_lines(frame.snapshot)}")
         self._leaving_sample, self._direct = -1, None
         self._leaving.begin()
         walked = [k for k in self._materials if may_walk(frame.snapshot.materials[k].graph)]
@@ -382,6 +416,7 @@ class ImageSpaceSubsurface(Technique):
     def release(self) -> None:
         self.points.release()
         self._light.release()
+        self._splats.release()
         self._give_whole()
         self._give_white()
         self._give_shapes()

@@ -8,6 +8,7 @@ from addon import engine
 from addon.gfx import images
 from addon.kernels import diffusion
 from addon.techniques import instant_radiosity
+from bench.subsurface_splats import edge
 from tests.techniques.conftest import places
 from tests.techniques.foggy_stage import box
 
@@ -81,6 +82,23 @@ def test_light_that_comes_in_along_a_ball_does_not_pass_the_wall_before_it(stage
     stage.light("SUN", energy=100.0, angle=0.0)
     stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
     assert shown(stage.render(1, size=(12, 12))).max() == 0.0
+
+
+@pytest.mark.slow
+def test_dipole_splats_of_a_half_lit_plane_are_the_edge_of_the_dipole(stage):
+    """By the specification of the source: sigma_a .1, sigma_s 2, here for an index of 1."""
+    medium = diffusion.Medium(0.1, 2.0, 0.0, 1.0)
+    color = (diffusion.dipole_total(medium),) * 3
+    free = WALK * medium.depths[0]
+    stage.scene.candela.image_space_subsurface_form = "SPLATS"
+    slab(stage, scattering(stage, "RANDOM_WALK", free, color=color), half=9.0)
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(2.0)
+    whole = shown(stage.render(4, size=(8, 8)))
+    assert whole == pytest.approx(0.99 * color[0], rel=0.01)  # of the dipole 1 % lies beyond a splat
+    stage.blocker((-50, -50), (0, 50), 1.0)
+    half = shown(stage.render(4, size=(8, 8)))[..., 0].mean(axis=0) / whole.mean()
+    assert half == pytest.approx([edge(medium, x) for x in places((8, 8), 2.0)[0][0]], abs=0.02)
 
 
 @pytest.mark.parametrize("turn", [0.0, np.pi])
