@@ -20,6 +20,7 @@ from ..scene import acceleration
 from ..scene.geometry import Draw
 from ..snapshot.scene import Light, Snapshot
 from ..sources import lights
+from ..sources.rates import Rate
 from . import depth_maps, edge_costs, repeated_light
 from .edge_costs import FEW_EDGES
 from .maps_or_rays import Compared, compared, maps_ns, rays_ns
@@ -35,7 +36,7 @@ RESOLUTION = Param(
 FINER_STOCHASTIC, FINER_FROM = 2.0, 64
 MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights would need more than a GPU grants
 
-BY_COST, BY_MAPS, BY_RAYS = "COST", "MAPS", "RAYS"
+BY_COST, BY_MAPS, BY_RAYS, BY_POINTS = "COST", "MAPS", "RAYS", "POINTS"
 SHADOWS_BY = Param(
     "by", "Shadows by", BY_COST,
     "How visibility of a point on a light is tested. Rays need opaque casters and a hierarchy of all triangles",
@@ -43,6 +44,8 @@ SHADOWS_BY = Param(
         (BY_COST, "What Costs Less", 0, "As measured on this device, for each light"),
         (BY_MAPS, "Depth Maps", 1, "Pictures of the scene as seen from points of the light"),
         (BY_RAYS, "Rays", 2, "A ray to a point of the light from each pixel"),
+        (BY_POINTS, "Maps of Points", 3,
+         "Of wide lamps, suns and the world many points in a sample, each with a small map drawn from points"),
     ),
 )  # fmt: skip
 PIXEL_SHARE = 0.1  # of a pixel's side on the nearest surfaces, by which rays may begin off them
@@ -96,6 +99,10 @@ class VisibilityProvider(Service):
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views of the maps that point `number` of the light needs, at `sample`."""
         return []
+
+    def rate(self, frame: Frame, rate: Rate) -> Rate:
+        """How often it would have a light sampled whose rate is that elsewhere."""
+        return rate
 
     def batches(self, frame: Frame, technique: Technique, points: list[LightPoint]) -> Iterator[Batch]:
         """The points in batches that fit a uniform block, each with what tells their visibility."""
@@ -224,7 +231,7 @@ def by_rays(
     """Whether rays take the place of maps. `views` makes those of such a map, where they are asked for; without any
     there is no shadow to trace. The ledger's row of the `technique` says why, `of` which light."""
     wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
-    if wanted == BY_MAPS or frame.settings.schedule.is_draft or acceleration.too_many(frame.snapshot):
+    if wanted in (BY_MAPS, BY_POINTS) or frame.settings.schedule.is_draft or acceleration.too_many(frame.snapshot):
         return False
     if drawn_stochastically(frame) or frame.shared(Layers).of:  # maps ask the material itself; rays know it by cells
         return False

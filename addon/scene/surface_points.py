@@ -53,25 +53,27 @@ class SurfacePoints:
         self.triangles = self.points = 0
         self._key: object = None
 
-    def update(self, frame: SceneOnGpu, points: int, distance: float) -> bool:
-        """Make runs of `points` points anew if geometry or alpha differ, or `distance`, m, of what is seen does much.
-        True if so."""
+    def update(self, frame: SceneOnGpu, points: int, distance: float, path: str = "diffuse") -> bool:
+        """Make runs of `points` points of what rays of `path` meet anew if geometry or alpha differ, or `distance`, m,
+        of what is seen does much. True if so."""
         reach = float(np.exp2(np.ceil(np.log2(4 * max(distance, 1e-30)))))
         eye = frame.snapshot.camera.matrix[:3, 3] - frame.geometry.origin
         eye = np.round(eye / reach) * reach if np.isfinite(eye).all() else np.zeros(3)
         snapshot, materials, origin = frame.snapshot, frame.measured_materials, frame.geometry.origin
         maps = frame.opacity_maps
         key = (
-            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.diffuse)
-                  for i in snapshot.instances),
+            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials,
+                   getattr(i.visibility, path)) for i in snapshot.instances),
             tuple(m.opacity if m.transparent else 1.0 for m in materials), maps.changes,
-            tuple(origin), tuple(eye), reach, points,
+            tuple(origin), tuple(eye), reach, points, path,
         )  # fmt: skip
         if key == self._key:
             return False
-        shown = [i for i in snapshot.instances if i.visibility.diffuse and snapshot.meshes[i.mesh].triangle_count]
+        shown = [
+            i for i in snapshot.instances if getattr(i.visibility, path) and snapshot.meshes[i.mesh].triangle_count
+        ]
         known = maps, frame.emission_maps
-        corners, look = world_triangles(shown, snapshot.meshes, materials, origin, "diffuse", *known)
+        corners, look = world_triangles(shown, snapshot.meshes, materials, origin, path, *known)
         meshes = [snapshot.meshes[i.mesh] for i in shown]
         surfaces = Surfaces(
             corners, coverage(look[:, 0], maps),

@@ -24,6 +24,8 @@ spot lights the map starts in the ball while light arrives from the disc that fa
 of the order of (radius / distance)^2 (above 1/16 direct_light traces rays). Under edge rays, casters f < 1/2 texels
 wide have shadows 2 f^2 wide.
 
+*Shadows by* Maps of Points has many points of wide lights in a sample, each with a small map (imperfect_maps.py).
+
 Fails: few samples show steps in penumbrae; casters thinner than a texel are missed in single samples; a receiver in no
 fitted view counts as lit. With rays, smooth-shaded facets shadow themselves, as in Cycles. Figures of rays and edge
 rays: docs/log/2026-11-26-soft-shadows.md.
@@ -31,11 +33,33 @@ rays: docs/log/2026-11-26-soft-shadows.md.
 
 from __future__ import annotations
 
+from ..frame.picture import Frame
+from ..lighting.imperfect_maps import ImperfectMaps, by_points
 from ..lighting.point_maps import CUTOFF, EDGE_RAYS, PointMaps
-from ..lighting.visibility import RESOLUTION, SHADOWS_BY
+from ..lighting.visibility import RESOLUTION, SHADOWS_BY, VisibilityProvider
+from ..sources import lights
 
 
 class AccumulatedMaps(PointMaps):
     name = "accumulated_maps"
     label = "Accumulated shadow maps"
     params = (RESOLUTION, CUTOFF, EDGE_RAYS, SHADOWS_BY)
+
+    def __init__(self):
+        super().__init__()
+        self._imperfect = ImperfectMaps()
+        self._by_points = False
+
+    def begin(self, frame: Frame) -> None:
+        super().begin(frame)
+        seen = frame.receivers is not None and len(frame.receivers.distance) > 0
+        self._by_points = seen and by_points(frame) and any(map(self._imperfect.serves, frame.emitters))
+        if self._by_points:
+            self._imperfect.begin(frame, self)
+
+    def serving(self, emitter: lights.Emitter) -> VisibilityProvider:
+        return self._imperfect if self._by_points and self._imperfect.serves(emitter) else self
+
+    def release(self) -> None:
+        super().release()
+        self._imperfect.release()

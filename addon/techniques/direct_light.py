@@ -149,7 +149,7 @@ class DirectLight(Technique):
 
     def _rate(self, frame: Frame, emitter: lights.Emitter, weight: float, shadow) -> Rate:
         """Points per sample: one where each would be the whole light, seen from its middle again and again."""
-        rate = rate_of(frame, emitter.light.key)
+        rate = shadow.rate(frame, rate_of(frame, emitter.light.key))
         points = rate.per_sample * frame.settings.samples / weight
         alike = emitter.extended and rate.per_sample > 1
         if alike and shadow.cell(frame, 0, points) >= 1.0 and shadow.part(frame, emitter, 0, points) is None:

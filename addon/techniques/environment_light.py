@@ -43,6 +43,7 @@ from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..lighting import depth_maps
 from ..lighting.caustic_casters import bright_world
+from ..lighting.imperfect_maps import IMPERFECT, ImperfectMaps, by_points
 from ..lighting.light_rates import LightRates, world_rate
 from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
 from ..lighting.maps_or_rays import compared
@@ -95,9 +96,11 @@ def _with_known(lookup: Lookup) -> Lookup:
     )
 
 
-KNOWN = {lookup: _with_known(lookup) for lookup in (HARD, RAYS)}
+KNOWN = {lookup: _with_known(lookup) for lookup in (HARD, RAYS, IMPERFECT)}
 KNOWN_LIGHTING = tuple(
-    lighting(lookup, soft_lobes, 1 << lights.DIRECTION) for lookup in KNOWN.values() for soft_lobes in (False, True)
+    lighting(KNOWN[lookup], soft_lobes, 1 << lights.DIRECTION)
+    for lookup in (HARD, RAYS)
+    for soft_lobes in (False, True)
 )
 OPENNESS = passes.fullscreen_program(
     "openness to the world",
@@ -162,6 +165,8 @@ class EnvironmentLight(Technique):
         self._edges: images.Image | None = None  # of the tiles' tables; None: directions are shared
         self._rays_for_direction = 1.0  # rays of a pixel that leave as little noise as a shared direction does
         self._traced = False  # directions are shared, and rays take the place of their maps
+        self._imperfect = ImperfectMaps()
+        self._by_points = False  # directions are many, and have small maps from points
         self._openness: list[images.Target] = []  # sums before this sample, and a place for those after it
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -172,7 +177,10 @@ class EnvironmentLight(Technique):
             return
         self._give_openness()
         patches = self._patches(frame) is not None
-        self._edges = None if patches else self._tables(frame, directions_rate(frame))
+        self._by_points = not patches and _cast_shadows(frame) and by_points(frame)
+        if self._by_points:
+            self._imperfect.begin(frame, self)
+        self._edges = None if patches or self._by_points else self._tables(frame, directions_rate(frame))
         own = not patches and self._edges is None
         self._traced = own and _cast_shadows(frame) and self._traces(frame, self._resolution(frame))
 
@@ -189,6 +197,7 @@ class EnvironmentLight(Technique):
         )
         resolution = self._resolution(frame)
         rate = directions_rate(frame)
+        rate = self._imperfect.rate(frame, rate) if self._by_points else rate
         if self._edges is not None:
             # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
             row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
@@ -212,7 +221,9 @@ class EnvironmentLight(Technique):
                 points.append(_patch(frame, patches, asked, rate, number, direction, radiance, density, shadows))
                 continue
             views = []
-            if shadows and not self._traced:
+            if self._by_points:
+                views = [self._imperfect.eye_along(frame, direction)]
+            elif shadows and not self._traced:
                 jitter = (
                     *frame.random("map/environment", number), *frame.random("map/environment/turn", number)
                 )  # fmt: skip
@@ -222,7 +233,8 @@ class EnvironmentLight(Technique):
                 direction, radiance / density, density, asked, 0, len(views) or self._traced, rate.per_sample,
                 float(frame.environment.openness(direction)),
             )  # fmt: skip
-            points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
+            maps = self._imperfect if self._by_points else self._maps
+            points.append(LightPoint(row, self._rays if self._traced else maps, views))
         if patches is not None:
             yield from light_surfaces(frame, self, points, 1 << lights.SUN, self._sources)
             return
@@ -328,6 +340,7 @@ class EnvironmentLight(Technique):
         self._edges = None
         self._give_openness()
         self._maps.release()
+        self._imperfect.release()
         self._sources.release()
 
 

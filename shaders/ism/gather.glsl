@@ -1,46 +1,7 @@
 // Virtual lights and their maps: every one brings what its map says, and a few rays correct that in the mean. Of those
 // that are shown one is drawn and taken off if a ray finds it hidden, of those that are not one is added if it is seen.
 #include "indirect/lights.glsl"
-#include "ism/paraboloid.glsl"
-
-#define SLACK 0.005  // of the distance, about the error of stored normals and of flat triangles on curved things
-
-// Whether a place of a surface is seen by a virtual light, all in the frame of its map: not behind the plane of what the
-// map shows there, unless that is the surface itself beside the place, bent away. On an arc the angle between two normals
-// is that by which the chord leaves the tangent, twice.
-float texel_visibility(ivec2 tile, ivec2 texel, vec3 place, vec3 normal, float slack)
-{
-  Plane blocker = plane_unpack(virtual_maps_fetch(tile + texel).xy);
-  float behind = dot(place, blocker.normal) - blocker.distance;
-  if (blocker.distance <= 0.0 || behind <= slack) {
-    return 1.0;
-  }
-  float alike = -dot(normal, blocker.normal);
-  vec3 direction = texel_direction(texel, map_side);
-  float apart = length(direction * min(plane_along(blocker, direction), 1e15) - place);
-  return (alike > 0.5 && behind < 0.75 * apart * sqrt(max(1.0 - alike * alike, 0.0)) + slack) ? 1.0 : 0.0;
-}
-
-// The share of a virtual light that a surface sees: bilinear between what four texels say.
-float map_visibility(int index, VirtualLight light, vec3 position, vec3 plane_normal)
-{
-  mat3 frame = map_frame(light.normal);
-  vec3 place = (position - light.position) * frame;
-  vec3 normal = plane_normal * frame;
-  float away = length(place);
-  vec2 spot = (disc_point(place / max(away, 1e-30)) * 0.5 + 0.5) * float(map_side) - 0.5;
-  ivec2 texel = ivec2(floor(spot));
-  vec2 part = spot - vec2(texel);
-  ivec2 tile = ivec2(index % map_columns, index / map_columns) * map_side;
-  float visible = 0.0;
-  for (int corner = 0; corner < 4; corner++) {
-    ivec2 step_to = ivec2(corner & 1, corner >> 1);
-    float weight = ((step_to.x == 1) ? part.x : 1.0 - part.x) * ((step_to.y == 1) ? part.y : 1.0 - part.y);
-    ivec2 inside = clamp(texel + step_to, ivec2(0), ivec2(map_side - 1));
-    visible += weight * texel_visibility(tile, inside, place, normal, SLACK * away);
-  }
-  return visible;
-}
+#include "ism/visibility.glsl"
 
 // Drawn while entries pass, in proportion to what they bring: for each channel one, mostly the same.
 struct Pick {
@@ -97,7 +58,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       if (!(bounded > 0.0) || dot(direction, s.geometric_normal) <= 0.0) {
         continue;
       }
-      float seen = map_visibility(i, light, s.position, s.geometric_normal);
+      float seen = map_visibility(i, light.position, light.normal, s.position, s.geometric_normal, 0.0);
       light.intensity *= passing_media(origin, direction, distance(light.position, origin), salt + uint(i));
       of_group += light.intensity * (bounded * seen);
       if (rays > 0) {

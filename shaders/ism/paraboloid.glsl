@@ -1,7 +1,11 @@
 // Half balls as discs (stereographic: angles are kept, circles stay circles), and what a texel of such a map holds: the
 // plane of what is nearest, as its distance from the map's point and its unit normal away from there, in the frame
 // whose z is the map's axis. Distance 0: nothing. Maps stand side by side in one image, `map_columns` in a row.
+// Maps of directions are squares, `parallel` metres to each side of the map's point, whose texels look along the axis; to
+// distances BIAS times as much is added there, since planes may lie on either side of the point.
 #include "lib/math.glsl"
+
+#define BIAS 64.0
 
 struct Plane {
   float distance;
@@ -20,10 +24,16 @@ vec3 disc_direction(vec2 point)
   return vec3(2.0 * point, 1.0 - squared) / (1.0 + squared);
 }
 
-// Direction through the middle of a texel of a map with `side` texels.
-vec3 texel_direction(ivec2 texel, int side)
+struct TexelRay {
+  vec3 start;
+  vec3 direction;
+};
+
+// Through the middle of a texel of a map with `side` texels; `parallel` 0: of a half ball.
+TexelRay texel_ray(ivec2 texel, int side, float parallel)
 {
-  return disc_direction((vec2(texel) + 0.5) * (2.0 / float(side)) - 1.0);
+  vec2 point = (vec2(texel) + 0.5) * (2.0 / float(side)) - 1.0;
+  return (parallel > 0.0) ? TexelRay(vec3(parallel * point, 0.0), vec3(0.0, 0.0, 1.0)) : TexelRay(vec3(0.0), disc_direction(point));
 }
 
 // From the frame of a map with this axis to world space; its transpose is its inverse: v * frame goes back.
@@ -50,9 +60,10 @@ Plane plane_unpack(vec2 texel)
   return plane;
 }
 
-// How far along a direction the plane lies; 1e30 where it is not met.
-float plane_along(Plane plane, vec3 direction)
+// How far along a ray the plane lies; 1e30 where it is not met.
+float plane_along(Plane plane, TexelRay ray, float parallel)
 {
-  float facing = dot(plane.normal, direction);
-  return (plane.distance > 0.0 && facing > 1e-6) ? plane.distance / facing : 1e30;
+  float facing = dot(plane.normal, ray.direction);
+  float away = plane.distance - BIAS * parallel - dot(plane.normal, ray.start);
+  return (plane.distance > 0.0 && facing > 1e-6) ? away / facing : 1e30;
 }

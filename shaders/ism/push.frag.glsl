@@ -6,12 +6,12 @@ void main()
 {
   ivec2 place = ivec2(gl_FragCoord.xy);
   ivec2 tile = place / map_side;
-  vec3 direction = texel_direction(place - tile * map_side, map_side);
+  TexelRay ray = texel_ray(place - tile * map_side, map_side, half_extent);
   out_plane = finer_maps_fetch(place).xy;
   vec2 coarse = coarser_maps_fetch(place >> 1).xy;
-  float own = plane_along(plane_unpack(out_plane), direction);
-  float filled = plane_along(plane_unpack(coarse), direction);
-  if (filled < 1e30 && own > filled * (1.0 + threshold)) {
+  float own = plane_along(plane_unpack(out_plane), ray, half_extent);
+  float filled = plane_along(plane_unpack(coarse), ray, half_extent);
+  if (filled < 1e30 && own > filled + threshold * ((half_extent > 0.0) ? half_extent : filled)) {
     out_plane = coarse;
   }
 }

@@ -7,17 +7,17 @@ void main()
   out_plane = vec2(0.0);
   gl_FragDepth = 1.0;
   ivec2 texel = ivec2(gl_FragCoord.xy) - ivec2(tile.xy);
-  vec3 direction = texel_direction(texel, map_side);
+  TexelRay ray = texel_ray(texel, map_side, half_extent);
   Plane own;
   own.distance = plane.w;
   own.normal = plane.xyz;
   own.whole = tile.z == TRIANGLE;
-  float along = plane_along(own, direction);
-  if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, ivec2(map_side))) || direction.z <= 0.0
+  float along = plane_along(own, ray, half_extent);
+  if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, ivec2(map_side))) || ray.direction.z <= 0.0
       || along >= 1e30) {
     discard;
   }
-  vec4 met = vec4(along * direction, 1.0);
+  vec4 met = vec4(ray.start + along * ray.direction, 1.0);
   float margin = 1e-3 * sqrt(disc.w);
   bool inside;
   if (own.whole) {
@@ -38,5 +38,6 @@ void main()
     discard;
   }
   out_plane = plane_pack(own);
-  gl_FragDepth = along / (along + depth_unit);
+  float depth = along / (abs(along) + depth_unit);
+  gl_FragDepth = (half_extent > 0.0) ? 0.5 + 0.5 * depth : depth;
 }

@@ -50,13 +50,19 @@ void main()
   // Below the horizon lies what lights up nothing, and in the plane of the map's point its own surface. Of a closed thing
   // that is seen from outside, the fronts hide all that its backs do; discs of the backs would only stick out.
   bool outside = !whole && (any(greaterThan(first.xyz, origin)) || any(lessThan(second, origin)));
-  if (centre.z <= (whole ? -radius : 1e-3 * reach) || abs(away) <= 1e-5 * max(reach, radius)
-      || (look.w < 0.0 && outside && away > 0.0)) {
+  bool below = centre.z <= (whole ? -radius : 1e-3 * reach) || abs(away) <= 1e-5 * max(reach, radius);
+  bool back = outside && away > 0.0;
+  float side_of = (away < 0.0) ? -1.0 : 1.0;
+  if (half_extent > 0.0) {
+    below = abs(normal.z) <= 1e-5;
+    back = !whole && normal.z > 0.0;
+    side_of = (normal.z < 0.0) ? -1.0 : 1.0;
+  }
+  disc = vec4(centre, radius * radius);
+  plane = vec4(side_of * normal, side_of * away + BIAS * half_extent);
+  if (below || plane.w <= 0.0 || (look.w < 0.0 && back)) {
     return;
   }
-  float side_of = (away < 0.0) ? -1.0 : 1.0;
-  disc = vec4(centre, radius * radius);
-  plane = vec4(side_of * normal, abs(away));
   tile.xy = vec2(float(map % map_columns), float(map / map_columns)) * float(map_side);
   if (whole) {
     vec3 corner = (first.xyz - origin) * frame;
@@ -79,7 +85,11 @@ void main()
   vec3 direction = centre / max(reach, 1e-30);
   vec2 middle = vec2(0.0);
   float size = 1.0;
-  if (sine < 0.95 && cosine + direction.z > 0.05) {
+  if (half_extent > 0.0) {
+    middle = centre.xy / half_extent;
+    size = radius / half_extent;
+  }
+  else if (sine < 0.95 && cosine + direction.z > 0.05) {
     middle = direction.xy / (cosine + direction.z);
     size = sine / (cosine + direction.z);
   }

@@ -171,3 +171,47 @@ def test_maps_do_not_depend_on_the_scale_of_the_scene(stage, render, scale):
         return render(2, points=256, samples=8)
 
     assert error(room(scale), room(1.0))[1] == pytest.approx(0.0, abs=0.02)
+
+
+# Wide lamps and the sky: points of theirs with maps of points ----------------------------------------------------------
+
+
+def direct_light(stage, by, samples=1, size=(32, 32)):
+    """Diffuse direct radiance by a kind of shadows of points."""
+    stage.scene.candela.slot_shadow = "accumulated_maps"
+    stage.scene.candela.accumulated_maps_by = by
+    images = render_passes(stage.scene, "CANDELA", samples, 0, size=size, bounces=0).images
+    assert ledger.latest().bad_pixels == 0
+    return light_paths(images)["diffuse_direct"].mean(axis=2)
+
+
+@pytest.mark.parametrize("pieces", [1, 24])
+def test_a_plate_below_a_wide_lamp_has_the_penumbra_of_rays_in_one_sample(stage, pieces):
+    """As one large triangle and as many small ones, which points stand for: no worse than a ray of each pixel."""
+    stage.floor(material=stage.diffuse(0.8))
+    steps = np.linspace(-0.4, 0.4, pieces + 1)
+    vertices = [(x, y, 0.5) for y in steps for x in steps]
+    row = pieces + 1
+    faces = [(k, k + 1, k + row + 1, k + row) for k in range(row * pieces) if k % row < pieces]
+    stage.mesh(vertices, faces, material=stage.diffuse(0.2))
+    stage.light("AREA", location=(0, 0, 2), size=1.5, energy=50)
+    stage.camera((0, -4, 1.2), (np.radians(73), 0, 0), 0.7)
+    expected = direct_light(stage, "RAYS", samples=64)
+    found = direct_light(stage, "POINTS")
+    spread, bias = error(found, expected)
+    print(spread, bias)
+    assert spread < error(direct_light(stage, "RAYS"), expected)[0] and abs(bias) < 0.01
+
+
+def test_the_sky_beside_a_wall_is_its_open_share(stage):
+    """A floor before an endless wall of height h sees (1 + x / sqrt(x^2 + h^2)) / 2 of an even sky."""
+    stage.floor(material=stage.diffuse(1.0))
+    stage.mesh([(0, -40, 0), (0, 40, 0), (0, 40, 1), (0, -40, 1)], [(0, 1, 2, 3)], material=stage.diffuse(0.0))
+    stage.world((1, 1, 1), 1.0)
+    camera = stage.camera((2.0, 0, 5), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
+    found = direct_light(stage, "POINTS", samples=4)[8:24].mean(axis=0)
+    x = 1.0 + (np.arange(32) + 0.5) / 16
+    expected = (1 + x / np.sqrt(x * x + 1)) / 2
+    np.testing.assert_allclose(found, expected, rtol=0.04)
+    assert ledger.latest().row("environment_light").counters["maps"] >= 64
