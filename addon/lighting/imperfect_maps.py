@@ -185,10 +185,16 @@ class Eye:
     parallel: bool
 
 
-def by_points(frame: Frame) -> bool:
-    """Whether wide lights have small maps from points. Casters that colour light have not: a share has no colour."""
-    wanted = frame.settings.value("accumulated_maps", SHADOWS_BY) == BY_POINTS
-    return wanted and not acceleration.too_many_copies(frame.snapshot) and not tinted_casters(frame)
+def by_points(frame: Frame, technique: Technique) -> bool:
+    """Whether wide lights have small maps from points. The ledger's row of the `technique` says why not."""
+    if frame.settings.value("accumulated_maps", SHADOWS_BY) != BY_POINTS:
+        return False
+    why = acceleration.too_many_copies(frame.snapshot)
+    if tinted_casters(frame):
+        why = "something colours the light that passes it, and shares of maps from points have no colour"
+    if why:
+        frame.account.chose(technique, "wide lights", f"depth maps, since {why}")
+    return not why
 
 
 class ImperfectMaps(VisibilityProvider):

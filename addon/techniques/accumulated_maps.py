@@ -53,7 +53,7 @@ class AccumulatedMaps(PointMaps):
     def begin(self, frame: Frame) -> None:
         super().begin(frame)
         seen = frame.receivers is not None and len(frame.receivers.distance) > 0
-        self._by_points = seen and by_points(frame) and any(map(self._imperfect.serves, frame.emitters))
+        self._by_points = seen and by_points(frame, self) and any(map(self._imperfect.serves, frame.emitters))
         if self._by_points:
             self._imperfect.begin(frame, self)
 

@@ -177,7 +177,7 @@ class EnvironmentLight(Technique):
             return
         self._give_openness()
         patches = self._patches(frame) is not None
-        self._by_points = not patches and _cast_shadows(frame) and by_points(frame)
+        self._by_points = not patches and _cast_shadows(frame) and by_points(frame, self)
         if self._by_points:
             self._imperfect.begin(frame, self)
         self._edges = None if patches or self._by_points else self._tables(frame, directions_rate(frame))

@@ -173,7 +173,7 @@ def test_maps_do_not_depend_on_the_scale_of_the_scene(stage, render, scale):
     assert error(room(scale), room(1.0))[1] == pytest.approx(0.0, abs=0.02)
 
 
-# Wide lamps and the sky: points of theirs with maps of points ----------------------------------------------------------
+# Wide lamps and the sky: points of theirs with maps of points ---------------------------------------------------------
 
 
 def direct_light(stage, by, samples=1, size=(32, 32)):
@@ -215,3 +215,13 @@ def test_the_sky_beside_a_wall_is_its_open_share(stage):
     expected = (1 + x / np.sqrt(x * x + 1)) / 2
     np.testing.assert_allclose(found, expected, rtol=0.04)
     assert ledger.latest().row("environment_light").counters["maps"] >= 64
+
+
+def test_light_that_glass_colours_has_depth_maps_and_says_so(stage):
+    stage.floor(material=stage.diffuse(0.8))
+    tinted = stage.material("ShaderNodeBsdfTransparent", Color=(1.0, 0.1, 0.1, 1.0))
+    stage.rectangle((-0.5, -0.5), (0.5, 0.5), 0.6, material=tinted)
+    stage.light("AREA", location=(0, 0, 2), size=1.0, energy=50)
+    stage.camera_above()
+    direct_light(stage, "POINTS", size=(16, 12))
+    assert "colours the light" in str(ledger.latest().row("accumulated_maps").choices)
