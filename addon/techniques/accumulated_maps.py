@@ -24,8 +24,6 @@ spot lights the map starts in the ball while light arrives from the disc that fa
 of the order of (radius / distance)^2 (above 1/16 direct_light traces rays). Under edge rays, casters f < 1/2 texels
 wide have shadows 2 f^2 wide.
 
-*Shadows by* Maps of Points has many points of wide lights in a sample, each with a small map (imperfect_maps.py).
-
 Fails: few samples show steps in penumbrae; casters thinner than a texel are missed in single samples; a receiver in no
 fitted view counts as lit. With rays, smooth-shaded facets shadow themselves, as in Cycles. Figures of rays and edge
 rays: docs/log/2026-11-26-soft-shadows.md.
