@@ -18,20 +18,18 @@ With `--page` each table becomes a part of docs/edge_shadows.md; with `--picture
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 
 from . import edge_scenes, markdown, soft, soft_scenes
-from .quick import size_of, table
+from .quick import table
 from .shading import node_of, tree_of
+from .study import PICTURES, Study, number, size, some_of
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "edge_shadows.md"
-COMMAND = "python -m bench edges --page"
 DCS, PWB = "depth_complexity", "penumbra_wedges"
 BY_EDGES = "soft lights with few edges: depth complexity"  # techniques/shadows_by_light.py
 RAYS_OF_TRUTH = 1024
-PARTS = ("families", "union", "cycles", "costs", "fence", "equal", "growth")
 
 
 def dcs(points: int, **values) -> tuple[tuple[str, object], ...]:
@@ -408,15 +406,15 @@ def growth(options) -> str:
     cases = [(count, 1, options.size) for count in (16, 64, 256, 1024)]
     cases += [(64, lamps, options.size) for lamps in (2, 4)]
     cases += [(64, 1, (width * k, height * k)) for k in (2, 4)]
-    for count, lamps, size in cases:
+    for count, lamps, film in cases:
         scene = boxes(count, 1.0)
         from .soft_lights import put_lights
 
         put_lights(scene, lamps)
-        soft.direct(scene, own, size)
+        soft.direct(scene, own, film)
         row, held = counters(DCS), kept_bytes(scene)
-        time = seconds(scene, own, size, options.runs)
-        pixels = f"{size[0]}x{size[1]}"
+        time = seconds(scene, own, film, options.runs)
+        pixels = f"{film[0]}x{film[1]}"
         mib = f"{held / 2**20:.1f}"
         rows.append(
             (f"{count}", f"{lamps}", pixels, f"{row['edges']:,}", f"{row['words']:,}", f"{1000 * time:.0f}", mib)
@@ -429,35 +427,26 @@ def show(rows) -> str:
     return markdown.table(rows)
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    names = list(soft_scenes.FAMILIES)
-    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
-    parser.add_argument("--families", nargs="+", choices=names, default=names, metavar="NAME")
-    parser.add_argument("--size", default="96x72", type=size_of, metavar="WxH")
-    parser.add_argument("--runs", default=2, type=int, metavar="N", help="for the times (default 2)")
-    parser.add_argument("--page", action="store_true", help="write the tables into docs/edge_shadows.md")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write visibilities there")
+PARTS = {
+    "families": families, "union": union, "cycles": against_cycles, "costs": costs, "fence": fence, "equal": equal,
+    "growth": growth,
+}  # fmt: skip
 
 
-def command(options: argparse.Namespace) -> int:
-    import addon
-    from addon.cli.terminal import quiet
-    from addon.gfx import context
+def told(part: Callable[[argparse.Namespace], str]) -> Callable[[argparse.Namespace], str]:
+    """The same, with what all figures of it are of."""
+    return lambda options: f"{part(options)}\n\n{options.size[0]}x{options.size[1]} pixels, a software GPU."
 
-    addon.register()
-    with quiet():
-        context.ensure()
-    made = {
-        "families": families,
-        "cycles": against_cycles,
-        "costs": costs,
-        "fence": fence,
-        "equal": equal,
-        "union": union,
-        "growth": growth,
-    }
-    for part in options.parts:
-        text = f"{made[part](options)}\n\n{options.size[0]}x{options.size[1]} pixels, a software GPU."
-        if options.page:
-            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
-    return 0
+
+STUDY = Study(
+    "edges",
+    {name: told(part) for name, part in PARTS.items()},
+    {
+        "--families": some_of(soft_scenes.FAMILIES),
+        "--size": size("96x72"),
+        "--runs": number(2, "for the times"),
+        "--pictures": PICTURES,
+    },
+    page="edge_shadows",
+)
+add_options, command = STUDY.add_options, STUDY.command

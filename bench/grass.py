@@ -24,10 +24,8 @@ import numpy as np
 
 from . import markdown
 from .shading import one_shader
+from .study import PICTURES, Study
 
-ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "grass.md"
-COMMAND = "python -m bench grass --page"
 SIZE = (128, 96)
 SUN = (0.7, 0.0, 0.5)
 SAMPLES_OF_CYCLES = 96  # of each of two pictures
@@ -35,26 +33,6 @@ SEEDS = (1, 2)
 HELD_OUT = ((10.0, 40.0), (30.0, 200.0), (50.0, 100.0), (68.0, 310.0), (80.0, 10.0))  # degrees
 FIELD = 6  # tiles from the middle to a side, for times
 BLADES = (1, 4)  # times as many in a tile
-PARTS = ("compression", "pictures", "outline", "shadows", "time")
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--parts", nargs="*", choices=PARTS, default=PARTS)
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what both showed as PNG")
-    parser.add_argument("--page", action="store_true", help="write the tables into docs/grass.md")
-
-
-def command(options: argparse.Namespace) -> int:
-    from addon import register
-
-    register()
-    made = dict(zip(PARTS, (compression, pictures, outline, shadows, times), strict=True))
-    for part in options.parts:
-        text = made[part](options)
-        print(f"{text}\n", flush=True)
-        if options.page:
-            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
-    return 0
 
 
 # Compression ---------------------------------------------------------------------------------------------------------
@@ -416,3 +394,8 @@ def _second() -> float:
 
     seed = bpy.context.scene.candela.seed
     return render_passes(bpy.context.scene, "CANDELA", 4, seed, size=SIZE, bounces=0).seconds
+
+
+PARTS = {"compression": compression, "pictures": pictures, "outline": outline, "shadows": shadows, "time": times}
+STUDY = Study("grass", PARTS, {"--pictures": PICTURES})
+add_options, command = STUDY.add_options, STUDY.command

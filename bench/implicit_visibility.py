@@ -10,18 +10,15 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 
 from bench import indirect, markdown
-from bench.quick import size_of
+from bench.study import Study, number, opened, size
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "implicit_visibility.md"
-COMMAND = "python -m bench implicit_visibility --page"
 NAME = "implicit_visibility"
 OTHERS = ("instant_radiosity", "imperfect_shadow_maps", "clustered_visibility", "ssdo")
 SAMPLES, MOST_SAMPLES = (1, 16), 64  # the last for this one and for instant radiosity
-SIZE, REFERENCE = (96, 64), 128
+SIZE = (96, 64)
 SURFELS, BINS = 3400, {14: "6 x 8²", 21: "6 x 12²", 28: "6 x 16²"}
 AUTHOR = {14: 112, 21: 148, 28: 218}  # ms on a GeForce 8800, one bounce of light of the environment
 STEPS = {  # programs by what they are for
@@ -33,41 +30,12 @@ STEPS = {  # programs by what they are for
 }
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="+", default=indirect.ROOMS, metavar="NAME", help="rooms to measure")
-    parser.add_argument("--parts", nargs="+", default=("error", "time"), choices=("error", "time"))
-    parser.add_argument("--samples", nargs="+", type=int, default=(*SAMPLES, MOST_SAMPLES), metavar="N")
-    parser.add_argument("--size", type=size_of, default=SIZE, metavar="WxH", help="default 96x64")
-    parser.add_argument(
-        "--reference", type=int, default=REFERENCE, metavar="N", help="samples of each of two references"
-    )
-    parser.add_argument("--page", action="store_true", help="write the tables into docs/implicit_visibility.md")
-
-
-def command(options: argparse.Namespace) -> int:
-    import addon
-
-    addon.register()
+def errors_of_all(options: argparse.Namespace) -> Iterator[str]:
+    """Rooms so far."""
     done: list[str] = []
-    for name in options.scenes if "error" in options.parts else ():
+    for name in options.scenes:
         done.append(f"**{name}**\n\n{errors(name, options)}")
-        written("error", "\n\n".join(done), options)  # what is measured stays when the run is ended
-    if "time" in options.parts:
-        written("time", times(), options)
-    return 0
-
-
-def written(part: str, text: str, options: argparse.Namespace) -> None:
-    print(f"\n{text}", flush=True)
-    if options.page:
-        markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
-
-
-def opened(name: str):
-    import bpy
-
-    bpy.ops.wm.open_mainfile(filepath=str(indirect.SCENES / f"{name}.blend"))
-    return bpy.context.scene
+        yield "\n\n".join(done)
 
 
 def errors(name: str, options: argparse.Namespace) -> str:
@@ -96,7 +64,7 @@ def anew() -> None:
     engine.free_sessions()
 
 
-def times() -> str:
+def times(options: argparse.Namespace) -> str:
     """Milliseconds of each step of one picture of one sample, the GPU waited for after each program."""
     from addon.compare.reference import render_passes
     from addon.frame import ledger
@@ -170,3 +138,16 @@ class timed_call:
 
     def __exit__(self, *_) -> None:
         setattr(self.owner, self.name, self.kept)
+
+
+STUDY = Study(
+    NAME,
+    {"error": errors_of_all, "time": times},
+    {
+        "--scenes": {"nargs": "+", "default": indirect.ROOMS, "metavar": "NAME", "help": "rooms to measure"},
+        "--samples": {"nargs": "+", "type": int, "default": (*SAMPLES, MOST_SAMPLES), "metavar": "N"},
+        "--size": size("96x64"),
+        "--reference": number(128, "samples of each of two references"),
+    },
+)
+add_options, command = STUDY.add_options, STUDY.command

@@ -20,7 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.indirect import BOUNCES, PATH, ROOMS, SCENES, reference, render
+from bench import study
+from bench.indirect import BOUNCES, PATH, ROOMS, reference, render
 from bench.points_motion import bent_object
 from bench.quick import size_of, table
 
@@ -185,14 +186,11 @@ def dials(options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
 
 
 def opened(name: str):
-    import bpy
-
-    file = DIAL_SCENE if name == BENDING else name
-    bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{file}.blend"))
+    scene = study.opened(DIAL_SCENE if name == BENDING else name)
     if name == BENDING:
         for _ in range(BENT_FRAMES):
-            bent_object(bpy.context.scene)
-    return bpy.context.scene
+            bent_object(scene)
+    return scene
 
 
 def write_picture(path: Path, pictures: list) -> None:

@@ -30,6 +30,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.markdown import write_whole
+from bench.study import size_of
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_blends"
@@ -357,13 +358,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--json", default=ROOT / "bench" / "results" / "quick.json", type=Path, metavar="PATH")
     parser.add_argument("--picture", default=ROOT / "docs" / "images" / "quick.png", type=Path, metavar="PATH")
     return parser.parse_args(arguments)
-
-
-def size_of(text: str) -> tuple[int, int]:
-    width, _, height = text.partition("x")
-    if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a size such as 256x192")
-    return int(width), int(height)
 
 
 def main(arguments: list[str]) -> int:

@@ -23,17 +23,14 @@ from pathlib import Path
 
 import numpy as np
 
-from . import markdown, relief_scenes
+from . import relief_scenes
 from .relief_scenes import LAMPS, SCENES
+from .study import PICTURES, Study, some_of
 
-ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "relief.md"
-COMMAND = "python -m bench relief --page"
 SIZE = (96, 64)
 SAMPLES = 16
 OWN_SAMPLES = {"SUN": 32, "AREA": 8, "WORLD": 16}
 REFERENCE_SAMPLES = {"SUN": 64, "AREA": 256, "WORLD": 256}
-PARTS = ("errors", "times", "detail", "iterations")
 TITLES = {
     "errors": "Beside Cycles' displaced mesh",
     "times": "Seconds from sync to picture, under the sun, 16 samples",
@@ -51,28 +48,6 @@ class Figures:
     away: float  # the same away from edges
     outline: float  # pixels
     intersection: float  # pixels; nan without a box
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
-    parser.add_argument("--lamps", nargs="*", default=list(LAMPS), choices=LAMPS)
-    parser.add_argument("--details", nargs="*", type=int, default=DETAILS, help="of the table by detail")
-    parser.add_argument("--parts", nargs="*", choices=PARTS, default=PARTS)
-    parser.add_argument("--page", action="store_true", help="write the tables of these parts into docs/relief.md")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what each entrant showed as PNG")
-
-
-def command(options: argparse.Namespace) -> int:
-    from addon import register
-
-    register()
-    made = dict(zip(PARTS, (error_table, time_table, growth_table, iteration_table), strict=True))
-    for part in options.parts:
-        text = f"**{TITLES[part]}**\n\n{markdown.table(made[part](options))}"
-        print(f"{text}\n", flush=True)
-        if options.page:
-            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
-    return 0
 
 
 def error_table(options: argparse.Namespace) -> list[list[str]]:
@@ -348,3 +323,17 @@ def iteration_table(options: argparse.Namespace) -> list[list[str]]:
         found = [iterations(name, *ray) for ray in RAYS]
         rows.append([name, *(f"{a:.2f} / {b:.2f}" for a, b in found)])
     return rows
+
+
+STUDY = Study(
+    "relief",
+    dict(zip(TITLES, (error_table, time_table, growth_table, iteration_table), strict=True)),
+    {
+        "--scenes": some_of(SCENES),
+        "--lamps": some_of(LAMPS),
+        "--details": {"nargs": "*", "type": int, "default": DETAILS, "help": "of the table by detail"},
+        "--pictures": PICTURES,
+    },
+    TITLES,
+)
+add_options, command = STUDY.add_options, STUDY.command

@@ -8,17 +8,13 @@ of Blender to the first picture, of which the hierarchy. Copies: 10^5 instances 
 
 from __future__ import annotations
 
-import argparse
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from bench.markdown import put_between, table
+from bench.study import Study
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "trees.md"
-COMMAND = "python -m bench trees"
 SIDE = 256  # rays along a side of their image
 OBJECTS, EACH = 2000, 500  # of the scene of a million triangles
 MAIN = """
@@ -32,27 +28,6 @@ void main()
   imageStore(found, pixel, vec4(normal, t));
 }
 """
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--part", choices=("rays", "moves", "copies"), action="append", help="all, if none is named")
-    parser.add_argument("--small", action="store_true", help="a tenth of everything, and no page")
-
-
-def command(options) -> int:
-    import addon
-    from addon.gfx import context
-
-    addon.register()
-    context.ensure()
-    parts = options.part or ["rays", "moves", "copies"]
-    size = 0.1 if options.small else 1.0
-    for part in parts:
-        rows = {"rays": rays, "moves": moves, "copies": copies}[part](size)
-        print(table(rows), flush=True)
-        if not options.small:
-            put_between(PAGE, f"{COMMAND} --part {part}", table(rows))
-    return 0
 
 
 # Triangles ------------------------------------------------------------------------------------------------------------
@@ -359,3 +334,13 @@ def moves(size: float) -> list[tuple[str, ...]]:
     said("the view rests", tuple(np.median(rests, axis=0)))
     renderer.release()
     return rows
+
+
+PARTS = {"rays": rays, "moves": moves, "copies": copies}
+STUDY = Study(
+    "trees",
+    {name: lambda options, part=part: part(0.1 if options.small else 1.0) for name, part in PARTS.items()},
+    {"--small": {"action": "store_true", "help": "a tenth of everything"}},
+    flag="--part",
+)
+add_options, command = STUDY.add_options, STUDY.command
