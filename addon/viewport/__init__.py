@@ -221,10 +221,10 @@ def _show(engine, scene, viewport: Viewport, pixel: tuple[float, float]) -> None
     """Draw the picture over the region, with the scene's colour management. `pixel`: size of one on the screen."""
     from gpu_extras.presets import draw_texture_2d
 
-    x, y, width, height = (extent * pixel[k % 2] for k, extent in enumerate(viewport.place))
+    x, y, width, height = (extent * pixel[k % 2] for k, extent in enumerate(viewport.display.place))
     gpu.state.blend_set("ALPHA_PREMULT")
     engine.bind_display_space_shader(scene)
-    draw_texture_2d(viewport.shown.texture, (x, y), width, height)
+    draw_texture_2d(viewport.display.shown.texture, (x, y), width, height)
     engine.unbind_display_space_shader()
     gpu.shader.unbind()
     gpu.state.blend_set("NONE")

@@ -97,14 +97,14 @@ def main() -> None:
 def drawn(renderer, looks, order, stage: str):
     """Draw an order's picture as a draft or in full; yields after each part how many programs are left, as far as
     known, and what technique they are for, where they are compiled as they are met."""
-    images, library, scene_view, picture = map(own, ("gfx.images", "gfx.library", "scene.view", "viewport.picture"))
-    coarser = picture.coarser
+    images, library, scene_view, begun = map(own, ("gfx.images", "gfx.library", "scene.view", "viewport.beginning"))
+    coarser = begun.coarser
     whole, settings = order["snapshot"], order["settings"]
     draft = stage == "draft"
     scale = FIRST_SCALE if draft else FULL_SCALE
     snapshot = replace(whole, film=coarser(whole.film, scale))
     settings = replace(settings, samples=max(settings.samples, SAMPLES))
-    beginning = renderer.beginning(snapshot, picture.drawn_with(settings, scale if draft else 1, waits=not draft))
+    beginning = renderer.beginning(snapshot, begun.drawn_with(settings, scale if draft else 1, waits=not draft))
     while True:
         try:
             done, total = next(beginning)

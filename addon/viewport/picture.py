@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, replace
-from math import ceil, floor
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from .. import techniques
 from ..film import catcher
@@ -19,50 +18,26 @@ from ..frame.bands import Bands
 from ..frame.picture import Frame
 from ..frame.reads import content
 from ..frame.run import Renderer
-from ..frame.settings import OFF, Settings
+from ..frame.settings import Settings
 from ..frame.within_sample import WithinSample
 from ..gfx import device, images, library, passes
-from ..scene.view import View
 from ..snapshot import SnapshotCache
-from ..snapshot.scene import Camera, Film, Snapshot
-from ..surfaces.first_look import FirstLook
+from ..snapshot.scene import Camera, Snapshot
 from ..techniques.film import check_tree
 from ..ui.notes import losses
 from ..ui.passes import RenderPass
 from . import one_pass
 from .ahead import Ahead
+from .beginning import AT_REST, CHECKS, CLIMBS, LIGHTS, MOVES, Beginning, coarser, drawn_with, only_direct
 from .catchers import LEFT_OUT, Catchers
-from .pace import SCALES, STEP_S, GuidePace, Pace
+from .display import Display, Place, Scene
+from .pace import SCALES, STEP_S, Pace
 
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
 REST_S = 0.25  # without a change for so long, or for two redraws, the picture is drawn in finer pixels
 
 MOST_LETTERS = 160  # of a warning in the region's text, for which Blender has 512 bytes
-
-CHECKS, MOVES, CLIMBS, LIGHTS = "checks", "moves", "climbs", "lights"  # why a frame is begun
-AT_REST = (CLIMBS, LIGHTS)
-
-
-@dataclass
-class Beginning:
-    """A frame that is being begun."""
-
-    parts: Generator[tuple[int, int], None, Frame]
-    camera: Camera
-    size: tuple[int, int]
-    border: tuple[int, int, int, int]
-    scale: int
-    # CHECKS: whether anything drawn has changed; MOVES: it has; CLIMBS: the same in finer pixels; LIGHTS: the same with
-    # indirect light, which was left out
-    why: str
-    samples: int
-    reading: float = 0.0  # seconds that the scene took to be read
-    seconds: float = 0.0
-    placed: bool = False  # geometry and materials are there
-    left: int = 0  # programs that it still has to compile, as far as known
-    direct: bool = False  # as `only_direct` says: another process compiles the programs of the rest
-    caught: Snapshot | None = None  # the scene, where its shadow catchers are drawn as such
 
 
 class Viewport:
@@ -78,8 +53,7 @@ class Viewport:
         self.cache = SnapshotCache()
         self.pace = Pace()
         self.bands = Bands()
-        self.look, self.guide = FirstLook(), FirstLook()
-        self.guides = GuidePace()
+        self.display = Display()
         self.catchers = Catchers()
         self.dirty = True  # the scene may have changed since the snapshot
         self.frame: Frame | None = None
@@ -94,20 +68,13 @@ class Viewport:
         self.news = False  # a ledger that the panels do not show yet
         self.reported = ""  # the error that was reported last
         self.failed_at: tuple | None = None  # the region's size and kind of view when the error came
-        self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
-        self.looks = False  # what is shown is a first look
         self._snapshot: Snapshot | None = None
         self._asked: tuple | None = None
         self._size = (0, 0)  # of the region when the frame was begun
         self._changed_at = 0.0
         self._finished = False
         self._beginning: Beginning | None = None
-        self._target: images.Target | None = None  # the picture, apart from the frame's images, which come and go
-        self._refined: images.Image | None = None  # a draft with the shapes of its guide
-        self._shown_with: tuple = ()  # what the picture was shown with, see Plan.shown_with
-        self._shown_place: tuple = ()  # from where, and in which pixels
-        self._begun_for: tuple = ()  # the same of the frame
-        self._look_of: tuple = ()  # of what the first look is
+        self._begun_for: Place = ()  # from where the frame shows the scene, and in which pixels
         self._waits = False  # what is shown is this view of this scene, only coarser
         self._sample: Iterator | None = None  # what is left of a sample that was begun
         self._sample_seconds = self._begun_s = 0.0  # `_begun_s`: what the frame took before its first sample
@@ -119,15 +86,13 @@ class Viewport:
 
     @property
     def picture(self) -> images.Image | None:
-        """What the region shows: the last whole sample and those before it, or a first look; None before the first."""
-        if self.looks:
-            return self.look.picture
-        return self._target.colors[0] if self._target else None
+        """What the region shows, see Display."""
+        return self.display.picture
 
     @property
-    def shown(self) -> images.Image | None:
-        """The same as it is drawn over the region: drafts with the shapes of what they show."""
-        return self.picture if self.looks or self._refined is None else self._refined
+    def looks(self) -> bool:
+        """What is shown is a first look."""
+        return self.display.looks
 
     @property
     def done(self) -> bool:
@@ -203,7 +168,7 @@ class Viewport:
         budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S)
         while self._begun(settings, clock, called, known, budget):
             frame, started = self.frame, clock()
-            if self._target is None and self._sample is None and frame.samples_done:
+            if not self.display.holds and self._sample is None and frame.samples_done:
                 self._resolve(frame)  # the frame outlived an error that took its picture
             elif self._sample is None and frame.samples_done and self._is_shown_otherwise(frame):
                 # The same samples, at another time or with other settings of a `show` stage.
@@ -224,7 +189,7 @@ class Viewport:
             self._finished = True
             self.renderer.finish(frame, ())  # publishes the ledger
             frame.ledger.times["total"] = self.seconds
-            self._drop_look()
+            self.display.drop_look()
             images.pool.trim()  # what only moving views needed
             self.news = True
         return self.picture
@@ -275,103 +240,54 @@ class Viewport:
         return spent
 
     def _is_shown_otherwise(self, frame: Frame) -> bool:
-        return frame.plan.shown_with(frame.snapshot, frame.settings) != self._shown_with
+        return frame.plan.shown_with(frame.snapshot, frame.settings) != self.display.shown_with
 
     def _resolve(self, frame: Frame) -> None:
         """Take the mean of the frame's samples for the picture."""
-        if self._target is None or self._target.size != frame.size:
-            self._drop_picture()
-            self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
-        if self.render_pass is None:
-            at = frame.at
-            shown = self.renderer.show(frame)
-            frame.at = at
-            if self.catchers.scene is not None:
-                with images.borrowed(*frame.size, "RGBA32F") as composed:
-                    self.catchers.compose(frame, shown, composed)
-                    self._put(frame, composed.colors[0])
-            else:
-                self._put(frame, shown)
-        else:
-            one_pass.draw(frame, self.render_pass, self._target)
-        self._shown_with, self.looks = frame.plan.shown_with(frame.snapshot, frame.settings), False
+        self.display.take(frame, self._begun_for, lambda target: self._put(frame, target))
         self.was_whole |= self.scale == 1
-        self._refined = self._with_shapes(frame) if self.scale > 1 else None
-        film = frame.snapshot.film
-        x, y = self._size[0] / film.width, self._size[1] / film.height
-        x0, y0, x1, y1 = film.border
-        self.place = x0 * x, y0 * y, (x1 - x0) * x, (y1 - y0) * y
-        self._shown_place = self._begun_for
+        if self.scale > 1 and self.render_pass is None:
+            self.display.refine(frame, self._scene, self.scale, max(self.step, self._sample_seconds))
 
-    def _put(self, frame: Frame, shown: images.Image) -> None:
-        """Take an image of the frame for the picture."""
+    def _put(self, frame: Frame, target: images.Target) -> None:
+        """Draw what is shown of the frame's samples."""
+        if self.render_pass is not None:
+            one_pass.draw(frame, self.render_pass, target)
+            return
+        at = frame.at
+        shown = self.renderer.show(frame)
+        frame.at = at
+        if self.catchers.scene is None:
+            self._put_image(frame, shown, target)
+            return
+        with images.borrowed(*frame.size, "RGBA32F") as composed:
+            self.catchers.compose(frame, shown, composed)
+            self._put_image(frame, composed.colors[0], target)
+
+    def _put_image(self, frame: Frame, shown: images.Image, target: images.Target) -> None:
         if self.direct and frame.snapshot.camera.panorama is None:
-            view = View(frame.snapshot.camera, frame.snapshot.film, self.renderer.geometry.origin)
-            scene = self._snapshot, self.renderer.geometry, self.renderer.materials.compiled
-            self.guide.fill_in(shown, self._target, *scene, view)
+            self.display.fill_in(shown, target, self._scene, frame)
         else:
-            passes.copy(shown, self._target)
+            passes.copy(shown, target)
 
-    def _with_shapes(self, frame: Frame) -> images.Image | None:
-        """The draft that is the picture, in finer pixels, if there is time for that and no lens blurs what it shows."""
-        if frame.snapshot.camera.aperture is not None or self.render_pass is not None:
-            return None
-        x0, y0, x1, y1 = self._begun_for[2]
-        pixels = (x1 - x0) * (y1 - y0)
-        scale = self.guides.scale(pixels, self.scale, max(self.step, self._sample_seconds))
-        if scale is None:
-            return None
-        started, fresh = time.perf_counter(), library.news()
-        # The rectangle of the draft's own pixels, which begins and ends with whole ones.
-        film, finer = frame.snapshot.film, self.scale // scale
-        whole = replace(
-            film, width=film.width * finer, height=film.height * finer, border=tuple(finer * e for e in film.border)
-        )
-        view = View(frame.snapshot.camera, whole, self.renderer.geometry.origin)
-        scene = self._snapshot, self.renderer.geometry, self.renderer.materials.compiled
-        self.guide.draw(*scene, view, guides=True)
-        refined = self.guide.refined(self.picture, film.exposure)
-        images.finish()
-        if library.news() == fresh:
-            self.guides.learn(time.perf_counter() - started, pixels // scale**2)
-        return refined
+    @property
+    def _scene(self) -> Scene:
+        return self._snapshot, self.renderer.geometry, self.renderer.materials.compiled
 
     def _show_something(self, camera: Camera, size, border) -> None:
         """If the picture of this view is still to come, and what is shown is of another one: a first look at it."""
-        pending = self._beginning is not None or not (self.frame.samples_done or self._waits)
-        place = content(camera, ("name",)), size, border
-        if camera.panorama is not None:  # the look is drawn by straight lines
-            return
-        if not pending or (self._target is not None and self._shown_place == place and not self.looks):
-            return
-        if self._beginning is not None and not self._beginning.placed:
-            return
-        made = (*place, self.renderer.geometry.changes, id(self._snapshot))
-        if made != self._look_of:
-            film = replace(self._snapshot.film, width=size[0], height=size[1], border=border)
-            view = View(camera, film, self.renderer.geometry.origin)
-            self.look.draw(self._snapshot, self.renderer.geometry, self.renderer.materials.compiled, view)
-            self._look_of = made
-        x0, y0, x1, y1 = border
-        self.place, self.looks = (x0, y0, x1 - x0, y1 - y0), True
+        begun = self._beginning
+        pending = begun is not None or not (self.frame.samples_done or self._waits)
+        # A look is drawn by straight lines, of what has been placed.
+        if pending and camera.panorama is None and (begun is None or begun.placed):
+            self.display.look_at(camera, size, border, self._scene)
 
     def drop(self) -> None:
         """Forget the picture and read the scene anew when it is next drawn."""
-        self._drop_picture()
-        self._drop_look()
+        self.display.drop()
         self.catchers.forget()
         self._sample = self._beginning = None
         self.dirty = True
-
-    def _drop_look(self) -> None:
-        self.look.release()
-        self.guide.release()
-        self._look_of, self.looks, self._refined = (), False, None
-
-    def _drop_picture(self) -> None:
-        if self._target is not None:
-            images.pool.give(self._target.colors[0])
-            self._target = self._refined = None
 
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Begin what is asked, at a fitting scale, if the frame is not of it."""
@@ -474,7 +390,8 @@ class Viewport:
             begun.placed, begun.left = True, total - done
             if self.held:
                 return False
-            if self.ahead is not None and not self._look_of and self.picture is None and begun.camera.panorama is None:
+            looks = not self.display.has_looked and self.picture is None and begun.camera.panorama is None
+            if self.ahead is not None and looks:
                 return False  # the first look comes before all else
             if begun.why == CHECKS and total:  # no picture that stays as it is compiles anything
                 self._changed(begun, settings, clock)
@@ -521,28 +438,7 @@ class Viewport:
         self._beginning = None
         self.renderer.release()
         self.cache.clear()
-        self._drop_picture()
-        self._drop_look()
+        self.display.drop()
         self.catchers.forget()
         self.catchers.scene = None
         self.frame = self._sample = self._snapshot = None
-
-
-def coarser(film: Film, scale: int) -> Film:
-    """The same film in pixels of `scale` times the size; its border is that of whole ones."""
-    width, height = (max(-(-extent // scale), 1) for extent in (film.width, film.height))
-    x, y = width / film.width, height / film.height
-    x0, y0, x1, y1 = film.border
-    return replace(film, width=width, height=height, border=(floor(x0 * x), floor(y0 * y), ceil(x1 * x), ceil(y1 * y)))
-
-
-def drawn_with(settings: Settings, scale: int, waits: bool) -> Settings:
-    """The settings of a picture at a scale. `waits`: a part is done when the GPU has done it; a draft of a moving view
-    is drawn as one, whose passes need not wait for each other."""
-    drawn = replace(settings, profile=waits)
-    return drawn.as_draft() if scale > 1 else drawn
-
-
-def only_direct(settings: Settings) -> Settings:
-    """The same without indirect light and what glass lets through, which have the largest programs."""
-    return replace(settings, bounces=0, slots={**settings.slots, "transmission": OFF})

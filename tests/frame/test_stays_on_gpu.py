@@ -86,7 +86,7 @@ def test_a_turning_viewport_makes_no_framebuffer_after_the_third_frame_of_a_size
     opened(name, 1)
     region, made = Region(samples=1), []
     # Guided in each frame; otherwise the clock decides, and the guide's framebuffers come at some later frame.
-    region.viewport.guides.scale = lambda pixels, scale, seconds: scale // 2
+    region.viewport.display.guides.scale = lambda pixels, scale, seconds: scale // 2
     for _ in range(8):
         region.camera = region.moved(1e-3)
         region.draw()

@@ -184,6 +184,6 @@ def test_pixel_size_of_blender_is_followed(window):
     window.update(made)
     window.draw(made)
     (kept,) = viewport._viewports.values()
-    assert kept.shown.size == (SIZE[0] // 4, SIZE[1] // 4) or kept.scale > 1
-    assert kept.place == (0, 0, SIZE[0] // 4, SIZE[1] // 4)
+    assert kept.display.shown.size == (SIZE[0] // 4, SIZE[1] // 4) or kept.scale > 1
+    assert kept.display.place == (0, 0, SIZE[0] // 4, SIZE[1] // 4)
     assert viewport.pixel_size("AUTO") in (1, 2) and viewport.pixel_size("8") == 8

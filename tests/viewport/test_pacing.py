@@ -171,17 +171,17 @@ def test_draft_has_the_shapes_of_the_surfaces_that_it_shows(region):
     """A coarse picture, shown in finer pixels: nearer to the whole picture than by its own."""
     whole = region.rest()[..., :3]
     region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.01}
-    region.viewport.guides.by_pixel = 0.0
+    region.viewport.display.guides.by_pixel = 0.0
     region.camera = region.moved(1e-4)
     region.draw()
-    assert region.viewport.scale == 8 and region.viewport.shown.size == SIZE
+    assert region.viewport.scale == 8 and region.viewport.display.shown.size == SIZE
 
     def error(picture):
         pixels = images.read(picture)[..., :3]
         fine = pixels.repeat(SIZE[1] // pixels.shape[0], 0).repeat(SIZE[0] // pixels.shape[1], 1)
         return np.abs(fine - whole).mean()
 
-    assert error(region.viewport.shown) < 0.8 * error(region.viewport.picture)
+    assert error(region.viewport.display.shown) < 0.8 * error(region.viewport.picture)
 
 
 def test_first_sample_is_shown_as_it_grows(region, monkeypatch):

@@ -99,7 +99,7 @@ def test_only_the_border_is_drawn(scene, region, scale):
         region.viewport.pace.cost = {1: 0.01}
     for _ in range(1 if scale > 1 else 20):
         picture = region.viewport.draw_frame(region.source, region.camera, SIZE, settings, region.clock, border)
-    assert region.viewport.place == (24, 16, 48, 24)
+    assert region.viewport.display.place == (24, 16, 48, 24)
     assert picture.size == (48 // scale, 24 // scale)
     if scale == 1:
         difference = np.abs(displayed(images.read(picture)) - displayed(whole[16:40, 24:72])).max(axis=-1)
