@@ -28,6 +28,7 @@ from ..gfx.context import turn
 from ..snapshot import UnsupportedScene, camera_of_view, take
 from ..snapshot.camera import framed, panoramic_view
 from ..snapshot.errors import unforeseen
+from ..snapshot.images import whole_key
 from ..snapshot.scene import Camera, Snapshot
 from ..ui.properties import settings_of
 from ..ui.viewport_pass import shown_pass
@@ -54,6 +55,8 @@ FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well
 LOOK_AGAIN_S = 0.1  # for programs that another process compiles
 SAY_S = 1.0  # between two redraws that tell how many
 EXTENSION = __package__.removesuffix(".viewport").removesuffix(".addon")
+
+LOOK_AT_IMAGES_S, LOOK_SHARE = 1.0, 20.0  # least time between two looks at unsaved images, and by what reading takes
 
 TURN_WAIT_S = 0.1  # for the GPU, while a final render draws a part of a sample
 
@@ -93,6 +96,7 @@ def draw(engine, context, depsgraph) -> None:
     place = (size, context.region_data.view_perspective)
     if viewport.error and viewport.failed_at != place:  # it may have been this view's, or this size's
         viewport.error = ""
+    viewport.dirty |= _painted(viewport)
     if not viewport.error:
         viewport.failed_at = place
         paused = viewport.paused = scene.candela.viewport_pause and viewport.picture is not None
@@ -119,6 +123,16 @@ def draw(engine, context, depsgraph) -> None:
         for area in context.screen.areas:
             if area.type == "PROPERTIES":
                 area.tag_redraw()  # the Frame panel shows this picture's ledger
+
+
+def _painted(viewport: Viewport) -> bool:
+    """Whether the scene has to be read for an image that is shown and not saved: scripts may have written into it, of
+    which Blender tells nobody. Asked now and then."""
+    now = time.monotonic()
+    if viewport.dirty or not viewport.settled or now < viewport.images_again:
+        return False
+    viewport.images_again = now + max(LOOK_AT_IMAGES_S, LOOK_SHARE * viewport.reading)
+    return any(one.is_dirty and whole_key(one.session_uid) in viewport.cache.images for one in bpy.data.images)
 
 
 def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int]) -> None:

@@ -51,5 +51,6 @@ def drawn_with(settings: Settings, scale: int, waits: bool) -> Settings:
 
 
 def only_direct(settings: Settings) -> Settings:
-    """The same without indirect light and what glass lets through, which have the largest programs."""
-    return replace(settings, bounces=0, slots={**settings.slots, "transmission": OFF})
+    """The same without indirect light, rays of gloss, and what glass lets through, which have the largest programs.
+    Points of lights then light narrow lobes, too."""
+    return replace(settings, bounces=0, slots={**settings.slots, "reflection": OFF, "transmission": OFF})

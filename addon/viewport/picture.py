@@ -56,6 +56,8 @@ class Viewport:
         self.display = Display()
         self.catchers = Catchers()
         self.dirty = True  # the scene may have changed since the snapshot
+        self.reading = 0.0  # seconds that it took to be read last
+        self.images_again = 0.0  # when unsaved images are looked at next
         self.frame: Frame | None = None
         self.scale = SCALES[-2]
         self.step, self.coarsest = STEP_S, SCALES[-1]  # what a step of a moving view may take; the coarsest pixels
@@ -98,6 +100,11 @@ class Viewport:
     def done(self) -> bool:
         """Nothing is left to be drawn until something changes."""
         return bool(self.error) or (self._finished and self._beginning is None) or self.paused
+
+    @property
+    def settled(self) -> bool:
+        """Nothing is being begun."""
+        return self.frame is not None and self._beginning is None
 
     def status(self) -> str:
         """How far the picture is, for the text in the region's corner."""
@@ -304,6 +311,7 @@ class Viewport:
             started = clock()
             self._snapshot = source(camera, *size)
             self.dirty, reading = False, clock() - started
+            self.reading = reading
         elif not moved:
             begun = self._beginning
             if settings.samples != (begun.samples if begun else self.frame.settings.samples):

@@ -49,6 +49,7 @@ def test_view_shows_a_first_look_then_direct_light_then_all_as_the_other_process
     assert viewport.status() == f"{slow.doing}, direct light only meanwhile"
     region.draw(region.moved(0.1))  # so does the picture without indirect light
     assert viewport.direct and viewport.frame.settings.bounces == 0
+    assert not viewport.frame.plan.runs("traced_glossy")
     slow.ready.add(DRAFT)
     for _ in range(20):
         region.clock.now += 1.0

@@ -187,3 +187,29 @@ def test_pixel_size_of_blender_is_followed(window):
     assert kept.display.shown.size == (SIZE[0] // 4, SIZE[1] // 4) or kept.scale > 1
     assert kept.display.place == (0, 0, SIZE[0] // 4, SIZE[1] // 4)
     assert viewport.pixel_size("AUTO") in (1, 2) and viewport.pixel_size("8") == 8
+
+
+def test_an_image_that_a_script_has_painted_is_seen_with_the_next_redraw(window, monkeypatch):
+    """Blender calls no `view_update` for it."""
+    image = bpy.data.images.new("Painted", 4, 4)
+    image.pixels.foreach_set(np.zeros(64, np.float32))
+    material = bpy.data.objects["Cube"].active_material or bpy.data.materials.new("Cube")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    shader = next(one for one in tree.nodes if one.type == "BSDF_PRINCIPLED")
+    tree.links.new(node.outputs["Color"], shader.inputs["Emission Color"])
+    shader.inputs["Emission Strength"].default_value = 1.0
+    bpy.data.objects["Cube"].active_material = material
+    made = Engine()
+    window.update(made)
+    before = window.draw_sample(made)
+    image.pixels.foreach_set(np.ones(64, np.float32))
+    image.update()
+    (kept,) = viewport._viewports.values()
+    kept.images_again = 0.0
+    window.draw(made)
+    after = window.draw_sample(made)
+    assert after[..., :3].mean() > before[..., :3].mean() + 0.02

@@ -34,8 +34,9 @@ from stage import (
 SAMPLES = 2
 PIXEL = "8"  # of the screen, for one of the picture
 PAUSE_S = 0.02
-SAME = 0.01  # of a value, between two pictures; rays search trees that were refitted, or are made anew
-MOST_OTHER = 0.02  # of all pixels may differ by more
+WHOLE = 50.0 * (2.0 - math.sqrt(2.0))  # Blender's zoom at which the camera's frame fills the region
+SAME = 0.03  # of a value, between two pictures: rays search trees that were refitted, or are made anew
+MOST_OTHER = 0.02  # of all blocks may differ by more
 EDITS = []
 before = []  # the picture before the last edit
 
@@ -231,6 +232,7 @@ def image_painted():
     image = bpy.data.images["Painted"]
     image.pixels.foreach_set(np.tile(np.array([0.9, 0.1, 0.1, 1.0], np.float32), 1024))
     image.update()
+    viewport_area().tag_redraw()  # as a brush does; of the image itself Blender tells nobody
 
 
 @edit
@@ -686,7 +688,7 @@ def stage_scene():
     things.objects.link(second)
     space = viewport_area().spaces.active
     space.overlay.show_overlays = space.show_gizmo = False
-    space.region_3d.view_perspective = "CAMERA"
+    space.region_3d.view_perspective, space.region_3d.view_camera_zoom = "CAMERA", WHOLE
     space.shading.type = "RENDERED"
 
 
@@ -717,6 +719,12 @@ def fresh():
     return found
 
 
+def blocks(picture):
+    """Means of 4 x 4 pixels: single choices of indirect light may differ, by the last digit of what they weigh."""
+    height, width = (extent // 4 * 4 for extent in picture.shape[:2])
+    return picture[:height, :width].reshape(height // 4, 4, width // 4, 4, -1).mean(axis=(1, 3))
+
+
 def compared(name):
     """Note how much the picture at rest differs from a fresh one."""
     module = candela()
@@ -726,10 +734,13 @@ def compared(name):
     if kept.shape != anew.shape:
         result["edits"][name] = {"shapes": [kept.shape, anew.shape]}
         return
-    scale = np.maximum(np.abs(anew[..., :3]).max(axis=-1), 0.02)
-    away = np.abs(kept - anew).max(axis=-1) / scale
+    kept_blocks, anew_blocks = blocks(kept), blocks(anew)
+    away = np.abs(kept_blocks - anew_blocks).max(axis=-1) / np.maximum(np.abs(anew_blocks[..., :3]).max(axis=-1), 0.02)
     mean = float(np.abs(kept.mean(axis=(0, 1)) - anew.mean(axis=(0, 1))).max() / max(anew[..., :3].mean(), 1e-3))
-    note = {"other": float((away > SAME).mean()), "mean": mean, "changed": None}
+    note = {
+        "seen": len(viewports()[0].frame.snapshot.instances), "other": float((away > SAME).mean()), "mean": mean,
+        "brightness": float(anew[..., :3].mean()), "changed": None,
+    }  # fmt: skip
     if before and before[-1].shape == kept.shape:
         note["changed"] = float(np.abs(kept - before[-1]).mean() / max(anew[..., :3].mean(), 1e-3))
     before[:] = [kept]

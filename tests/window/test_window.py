@@ -462,6 +462,28 @@ def test_an_observer_is_chosen_and_its_glare_seen(tried):
 
 
 @pytest.fixture(scope="module", params=BACKENDS)
+def edited(request, installed):
+    """One edit after the other, each compared with a viewport that has kept nothing."""
+    return run_script(request.param, "session")
+
+
+def test_no_edit_leaves_anything_stale_in_the_view(edited):
+    folder, result = edited
+    assert result.get("error") is None and not result["failed"], result
+    assert not complaints(folder)
+    assert all("shapes" not in one for one in result["edits"].values())
+    stale = {name: one for name, one in result["edits"].items() if one["other"] > 0.02 or one["mean"] > 0.01}
+    assert not stale
+
+
+def test_local_view_shows_what_is_in_it_alone(edited):
+    _, result = edited
+    seen = {name: result["edits"][name]["seen"] for name in ("local_view", "local_view_edit", "local_view_ends")}
+    assert seen["local_view"] == seen["local_view_edit"] == 1 < seen["local_view_ends"]
+    assert result["edits"]["local_view"]["brightness"] < 0.1 * result["edits"]["local_view_ends"]["brightness"]
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
 def strolled(request, installed):
     """A random walk of STROLL_SECONDS; `make window-walk` takes ten minutes."""
     return run_script(request.param, "stroll", os.environ.get("STROLL_SECONDS", "60"), "CANDELA")
