@@ -29,7 +29,6 @@ BRINGS = {
 COLOURED = ("instant_radiosity", "multires_radiosity", "clustered_visibility")  # whose rays take colours of layers
 GEM = 2.0  # index of refraction, from which on most directions are mirrored totally
 GEM_INTERFACES = 24  # crossings that such glass needs
-ANSWERED = 0.25  # roughness up to which a metal's light is that of caustics (lighting/caustic_casters.py)
 WIDE = 0.45  # roughness from which a lobe is about as wide as those of paths (shaders/indirect/albedo.glsl)
 NO_GRASS = ("no material", "it is not in the pass tree")  # how reasons begin that nobody need hear
 
@@ -64,7 +63,7 @@ def _thrown_wide(
     """Gloss that is narrower than the lobes of paths and no caustic: what it throws onto surfaces is blurred."""
     if "indirect" not in plan.filled or settings.bounces <= 0:
         return
-    least = ANSWERED if "caustics" in plan.filled else 0.0
+    least = gloss.SMOOTH if "caustics" in plan.filled else 0.0
     names = []
     for number in sorted(snapshot.used_materials):
         graph = snapshot.materials[number].graph

@@ -1,7 +1,7 @@
 """Casters of caustics: the materials, objects and lights that techniques of the slot `caustics` take over.
 
-A material is a caster if it bends light (glass, of any roughness) or mirrors it with no diffuse part to speak of
-(materials/gloss.py) and is smooth: roughness up to SMOOTH, known from the socket's own value. What a varnish over a
+A material is a caster if it bends light (glass, of any roughness) or mirrors it with no diffuse part to speak of and is
+smooth (materials/gloss.py): roughness up to gloss.SMOOTH, known from the socket's own value. What a varnish over a
 diffuse surface mirrors stays with indirect light.
 
 A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. So are emissive meshes,
@@ -40,7 +40,6 @@ from .light_views import groups
 
 SLOT = "caustics"
 MESHES, WORLD = "emissive meshes", "the world"  # keys beside those of lamps, which are none of these
-SMOOTH = 0.25  # roughness
 MARGIN = 0.02  # of a caster's box, for what its float32 bounds miss
 FLAT = 0.999  # cosine between normals of a pane's faces
 MOST_LOOKED_AT = 200_000  # triangles of a mesh of which it is asked whether it is convex
@@ -52,7 +51,7 @@ _CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHol
 
 def mirror_roughness(graph: Graph) -> float | None:
     """Roughness of a material that mirrors photons; None if it does not."""
-    return min((rough for rough in gloss.mirrors(graph) if rough <= SMOOTH), default=None)
+    return min((rough for rough in gloss.mirrors(graph) if rough <= gloss.SMOOTH), default=None)
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
+from ..materials import gloss
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..sources import lights
@@ -375,7 +376,7 @@ class Photons:
         )  # fmt: skip
         for lobe, block, surfaces in drawn:
             values = {
-                "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),
+                "box_low": (*view.low, 0.0), "box_high": (*view.high, gloss.SMOOTH),
                 "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), strata),
                 "absorbed": (*self._absorbed, 0.0), "passing": tuple(passing), "mirroring": float(mirroring),
                 "interfaces": interfaces, "bends": int(lobe == REFRACTED),

@@ -19,6 +19,7 @@ from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
+from ..materials import gloss
 from ..scene.culling import calls
 from ..scene.materials import SURFACE_IMAGES
 from ..scene.overview import DIRECTIONS, overview, some
@@ -35,8 +36,8 @@ REFLECTANCE = passes.fullscreen_program(
     "reflectance",
     "indirect/reflectance.frag.glsl",
     textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
-    constants=(("IVEC2", "extent"), ("INT", "rows"), ("FLOAT", "view_cosine")),
-    defines=(("SMOOTH_MIRROR", "0.2501"),),  # roughness, see lighting/caustic_casters.py
+    constants=(("IVEC2", "extent"), ("INT", "rows"), ("FLOAT", "view_cosine"), ("INT", "mirrors")),
+    defines=(("SMOOTH_MIRROR", f"{gloss.SMOOTH + 1e-4:.4f}"),),
     outputs=(("VEC4", "out_reflectance"),),
 )
 # For programs that read the image where a technique brings what mirrors and glass throw on diffuse surfaces.
@@ -84,24 +85,36 @@ class Reflectance:
                 draw_overview(frame, target, (*corner, SIDE, SIDE), material, direction, program, {}, constants)
         cells = [(k % COLUMNS, band * rows + k // COLUMNS, 1, 1) for k in changed for band in range(BANDS)]
         for viewport in cells if few else [None]:
-            passes.fullscreen(
-                REFLECTANCE,
-                images.Target((self.image,)),
-                viewport=viewport,
-                textures={
-                    **{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, seen)},
-                    "energy_table": frame.materials.energy_table,
-                },
-                constants={"extent": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE},
-            )
+            self._average(frame, seen, viewport, rows, mirrors=0)
+        for k in filter(lambda k: _throws_caustics(frame, k), changed):
+            self._average(frame, seen, (k % COLUMNS, k // COLUMNS, 1, 1), rows, mirrors=1)
         for image in seen:
             images.pool.give(image)
+
+    def _average(self, frame: Frame, seen: list[images.Image], viewport, rows: int, mirrors: int) -> None:
+        passes.fullscreen(
+            REFLECTANCE,
+            images.Target((self.image,)),
+            viewport=viewport,
+            textures={
+                **{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, seen)},
+                "energy_table": frame.materials.energy_table,
+            },
+            constants={"extent": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE, "mirrors": mirrors},
+        )
 
     def release(self) -> None:
         if self.image is not None:
             self.image.defines = ()
             images.pool.give(self.image)
         self.image, self._keys = None, {}
+
+
+def _throws_caustics(frame: Frame, material: int) -> bool:
+    """As lighting/caustic_casters.py has it: polish over another surface does not, however dark that is."""
+    graph = frame.snapshot.materials[material].graph
+    smooth = min(gloss.mirrors(graph), default=1.0) <= gloss.SMOOTH
+    return smooth or frame.materials.compiled[material].glass is not None
 
 
 def keys_of(frame: Frame) -> dict[int, object]:

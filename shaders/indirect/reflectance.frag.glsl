@@ -7,11 +7,12 @@
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
 
-// 1: a smooth mirror or glass, whose light photons of caustics bring where a technique owns it.
+// 1: a smooth mirror of a material that throws caustics (`mirrors`) or glass, whose light photons bring where a technique
+// owns it.
 float mirrors_photons(Surface s, Reflection r)
 {
   bool glass = s.kind == LOBE_REFRACTION;
-  bool mirror = s.kind < LOBE_REFRACTION && luminance(r.grazing) > 0.0 && s.glossy_roughness <= SMOOTH_MIRROR
+  bool mirror = mirrors != 0 && s.kind < LOBE_REFRACTION && luminance(r.grazing) > 0.0 && s.glossy_roughness <= SMOOTH_MIRROR
                 && luminance(r.straight) >= luminance(r.diffuse);
   return (glass || mirror) ? 1.0 : 0.0;
 }

@@ -58,8 +58,17 @@ def test_pictures_that_cannot_be_compared_are_red(truth, wrong):
 def test_a_short_reference_allows_nothing(truth):
     """Its own noise is in the error already: what is within bounds all the same needs no longer one."""
     half = np.kron(np.random.default_rng(3).normal(0.0, 0.1, (6, 8, 1)), np.ones((4, 4, 3)))
-    assert not pairs.judged(truth + half, truth, half, 16, allowing=False)["good"]
-    assert pairs.judged(truth * 1.01, truth, half, 16, allowing=False)["good"]
+    assert not pairs.judged(truth + half, truth, half, 16, doubt=0)["good"]
+    assert pairs.judged(truth * 1.01, truth, half, 16, doubt=0)["good"]
+
+
+def test_fireflies_of_a_long_reference_are_no_error_of_the_mean(truth):
+    """One block of each reference has a path that found a lamp; by chance both have as much in all."""
+    half = np.zeros_like(truth)
+    half[:4, :4], half[8:12, 8:12] = 1.0, -1.0
+    found = truth + np.abs(half)
+    assert not pairs.judged(truth, found, half, 16, doubt=1)["good"]
+    assert pairs.judged(truth, found, half, 16, doubt=2)["good"]
 
 
 def test_what_has_met_least_comes_first():

@@ -7,7 +7,6 @@ import pytest
 from addon.frame import left_out
 from addon.frame.ledger import SKIPPED, Row
 from addon.frame.plan import Plan
-from addon.lighting import caustic_casters
 from addon.materials.graph import Graph, Input, Node
 from addon.scene import acceleration
 from addon.snapshot.panorama import bends_lines
@@ -131,7 +130,6 @@ def glossy(name, **inputs):
 def test_gloss_that_is_thrown_wider_than_it_is_is_named(monkeypatch, inputs, said):
     for name in ("too_many", "too_many_copies"):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
-    assert left_out.ANSWERED == caustic_casters.SMOOTH
     material, graph = glossy("Pan", **inputs)
     scene = SimpleNamespace(camera=None, used_materials={0}, materials=[SimpleNamespace(graph=graph)])
     plan, some = Plan((), (), {"indirect": "instant_radiosity", "caustics": "caustics"}), SimpleNamespace(bounces=4)

@@ -113,8 +113,13 @@ def fresnel(cosine, index=1.5):
     return 0.5 * ((g - c) / (g + c)) ** 2 * (1 + ((c * (g + c) - 1) / (c * (g - c) + 1)) ** 2)
 
 
-def test_a_polished_floor_throws_what_fresnel_says_at_grazing_incidence(stage, render):
-    """A lamp low above black polish, mirrored onto a wall: lobes are widened, and wide ones reflect half of that."""
+@pytest.mark.parametrize("metal", [False, True], ids=["alone", "beside what throws caustics"])
+def test_a_polished_floor_throws_what_fresnel_says_at_grazing_incidence(stage, render, metal):
+    """A lamp low above black polish, mirrored onto a wall: lobes are widened, and wide ones reflect half of that.
+    Where photons bring what metal throws, polish is left to virtual lights all the same."""
+    if metal:
+        polished = stage.principled(Metallic=1.0, Roughness=0.1)
+        stage.rectangle((-0.1, -0.1), (0.1, 0.1), z=0.1, material=polished, location=(3.8, 1.0, 0))
     stage.rectangle((-20, -20), (20, 2), material=stage.principled(Base_Color=(0, 0, 0, 1), Roughness=0.05))
     stage.mesh([(-4, 2, 0), (4, 2, 0), (4, 2, 6), (-4, 2, 6)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
     stage.light("POINT", (0, -3, 0.8), energy=100 * np.pi, shadow_soft_size=0.05)  # intensity 25
