@@ -80,7 +80,7 @@ PHOTONS = passes.fullscreen_program(
         *(("RGBA32F", name) for name in ("energy_table", "reflectance", "interface_table")),
     ),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
-    constants=(("FLOAT", "offset_size"), ("INT", "photon_roll")),
+    constants=(("FLOAT", "offset_size"), ("INT", "photon_roll"), ("INT", "photon_gloss")),
     outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
 )  # fmt: skip
 MAP = (("RGBA32F", "receiver_position"), ("RGBA32F", "receiver_normal"))
@@ -311,9 +311,11 @@ class Photons:
         return {caustic_casters.key_of(one) for one in resting}
 
     def traced(
-        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int
-    ) -> Iterator[Bundle]:
-        """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next."""
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int,
+        gloss: bool = False,
+    ) -> Iterator[Bundle]:  # fmt: skip
+        """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next.
+        `gloss`: glossy lobes may take those that clear glass lets pass."""
         target = self._target("_found", light.view.side, len(FOUND))
         for block, bound in self._drawn(frame, technique, casters, light, interfaces):
             textures = {
@@ -325,7 +327,9 @@ class Photons:
                 target,
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},
-                constants={"offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index},
+                constants={
+                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": int(gloss)
+                },
             )  # fmt: skip
             yield self._bundle(frame, technique, target, light)
 

@@ -17,8 +17,11 @@ place of a mask's pyramid, and all photons kept with their weight in place of ro
 | passes | 2 of the grid, 1 instanced draw of it into the picture |
 | bytes | 20 x 16 per photon |
 
-Bias, in diffuse indirect: as photons.py says. Receivers reflect evenly by their albedo; what glossy lobes mirror of
-a caustic is left out. Caustics seen in mirrors and through glass come from maps (lighting/caustic_maps.py).
+Rough glossy lobes take photons of lamps and the world that clear glass has let pass, and rays of theirs leave those
+out: a ray finds a small lamp through glass so rarely that it is a bright dot (shaders/caustics/gloss.glsl).
+
+Bias, in diffuse indirect: as photons.py says. Receivers reflect evenly by their albedo. Caustics seen in mirrors and
+through glass come from maps (lighting/caustic_maps.py).
 What of the world's light is not much brighter than its mean passes casters straight.
 
 Fails: above 4 million triangles nothing is traced.
@@ -27,6 +30,7 @@ Fails: above 4 million triangles nothing is traced.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.picture import Frame
@@ -38,21 +42,32 @@ from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters
 from ..lighting.caustic_maps import SEEN, CausticMaps
+from ..lighting.path_sources import ShadedLobes
 from ..lighting.photons import FOOTPRINTS, PHOTONS, SPREAD_SIDE, LitView, Photons
 from ..scene import acceleration
+from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
 from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
-from ..surfaces.draw import SURFACES, surface_bindings
+from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 
-SPLAT = splats.splat_program(
-    "photon splat",
-    "caustics/splat.frag.glsl",
-    "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w",
-    textures=(*SEEN, ("RGBA32F", "energy_table")),
-    blocks=((VIEW, "film_view"),),
-    outputs=(("VEC4", "out_light"),),
-)
+
+@cache
+def splat_program(gloss: bool) -> Program:
+    """Draws photons into the picture. `gloss`: glossy lobes take them, too."""
+    return splats.splat_program(
+        "photon splat",
+        "caustics/splat.frag.glsl",
+        "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w",
+        textures=(*(SURFACE_TEXTURES if gloss else SEEN), ("RGBA32F", "energy_table")),
+        blocks=((VIEW, "film_view"),),
+        defines=(("GLOSS", ""),) if gloss else (),
+        outputs=(("VEC4", "out_light"), *((("VEC4", "out_gloss"),) if gloss else ())),
+    )
+
+
+DECLARED = splat_program(False), splat_program(True)
+LIGHT, GLOSS = "radiance.diffuse_indirect", "radiance.glossy_indirect"
 LEAST_PIXELS = 0.8
 MAPS_APART = 4  # samples for which rays ask the same map: it costs as much as the picture's photons, and shows less
 INTERFACES = Param(
@@ -77,7 +92,10 @@ class ScreenSpacePhotons(Technique):
         INTERFACES,
     )  # fmt: skip
     reads = SURFACES
-    writes = (Write("radiance.diffuse_indirect", "RGBA32F", "Light that arrives over other surfaces", True),)
+    writes = (
+        Write(LIGHT, "RGBA32F", "Light that arrives over other surfaces", True),
+        Write(GLOSS, "RGBA32F", "Light that glossy surfaces receive from other surfaces", True, by_need=True),
+    )
 
     def __init__(self):
         self._photons = Photons()
@@ -95,7 +113,7 @@ class ScreenSpacePhotons(Technique):
         return True
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return PHOTONS, FOOTPRINTS, SPLAT
+        return PHOTONS, FOOTPRINTS, splat_program(_on_gloss(snapshot, caustic_casters.casters_of(snapshot)))
 
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)
@@ -106,7 +124,9 @@ class ScreenSpacePhotons(Technique):
                     self, "photons", f"{SPREAD_SIDE} x {SPREAD_SIDE}, because nothing makes light converge"
                 )
             at_once = self._photons.all_at_once(frame, self._casters)
-            self._turns.begin(frame, ("radiance.diffuse_indirect",), at_once)
+            on_gloss = GLOSS in frame.images and _on_gloss(frame.snapshot, self._casters)
+            frame.shared(caustic_casters.Answered).on_gloss = on_gloss
+            self._turns.begin(frame, (LIGHT, GLOSS) if on_gloss else (LIGHT,), at_once)
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if self._casters is None or not self._turns.weight(frame):
@@ -120,7 +140,7 @@ class ScreenSpacePhotons(Technique):
             maps.begin(frame, self._photons.resting(frame, self._casters), lasting)
         turn = self._turns.turn(frame) if self._turns.may_rest else None
         with self._turns.drawing(frame) as drawing:
-            target = images.Target((drawing.images(0)["radiance.diffuse_indirect"],))
+            target = images.Target(tuple(drawing.images(0).values()))
             for light in self._photons.views(frame, self._casters, side, turn, fitted=True):
                 self._add(frame, target, light, maps if renews else None)
                 yield
@@ -130,14 +150,21 @@ class ScreenSpacePhotons(Technique):
 
     def _add(self, frame: Frame, target: images.Target, light: LitView, maps: CausticMaps | None) -> None:
         """Photons of a light's view, into the picture and into the map that rays ask, where there is one."""
-        seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}
+        on_gloss = len(target.colors) > 1
+        textures = SURFACE_TEXTURES if on_gloss else SEEN
+        seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in textures}
         at_hits = maps is not None and maps.wants(frame, light)
         if at_hits:
             into_kept = maps.add(frame, self, self._casters, light, self._photons)
-        for bundle in self._photons.traced(frame, self, self._casters, light, frame.settings.get(self, "interfaces")):
+        # Rays of gloss leave out what photons bring it: of lamps whose light they take glass as opaque for.
+        key, rayed = caustic_casters.key_of(light.emitter), frame.service(ShadedLobes) is not None
+        known = not rayed or key == caustic_casters.WORLD or key in frame.kept(CausticMaps).lights
+        gloss = on_gloss and known and key != caustic_casters.MESHES
+        interfaces = frame.settings.get(self, "interfaces")
+        for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, gloss):
             records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
             splats.draw(
-                SPLAT,
+                splat_program(on_gloss),
                 target,
                 records,
                 textures={**seen, "energy_table": frame.materials.energy_table},
@@ -151,3 +178,9 @@ class ScreenSpacePhotons(Technique):
         self._photons.release()
         self._turns.drop()
         self._casters = None
+
+
+def _on_gloss(snapshot: Snapshot, casters: caustic_casters.Casters | str) -> bool:
+    """Whether glossy lobes may take photons."""
+    bends = isinstance(casters, caustic_casters.Casters) and bool(casters.refracting)
+    return bends and snapshot.film.caustics_refractive and may_be_glossy(snapshot)

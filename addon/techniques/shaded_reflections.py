@@ -43,7 +43,7 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting import caustic_maps, linked
 from ..lighting.asked import lit_at_hits
-from ..lighting.caustic_casters import bright_world, meshes_answered
+from ..lighting.caustic_casters import Answered, bright_world, meshes_answered
 from ..lighting.caustic_maps import CausticMaps
 from ..lighting.glass_interfaces import clear_roughness
 from ..lighting.light_rates import EmissivePoints
@@ -124,6 +124,7 @@ def scatter_program(onward: bool) -> Program:
             ("FLOAT", "clear_roughness"),
             ("FLOAT", "first_rays"),
             ("INT", "way"),
+            ("INT", "photons_shine"),
         ),
         defines=(("ONWARD", "1"),) if onward else (),
         outputs=(
@@ -390,6 +391,7 @@ class ShadedReflections(Technique, BothWays):
                     **reach, "ray_number": number, "offset_size": frame.offset_size,
                     "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
                     "first_rays": self._first_rays, "way": way,
+                    "photons_shine": int(frame.shared(Answered).on_gloss),
                 },
             )  # fmt: skip
         frame.count(self, "passes")

@@ -1,5 +1,6 @@
 // Footprints of photons: the ellipse that a photon's neighbours on the grid span about it (addon/lighting/photons.py), as
-// records of addon/kernels/splats.py. `film_view`: the view into which they will be drawn.
+// records of addon/kernels/splats.py, with 1 and where it came from in w of the centre, or .5 if glossy lobes do not take it.
+// `film_view`: the view into which they will be drawn.
 #include "ask/view.glsl"
 #include "lib/math.glsl"
 
@@ -17,7 +18,7 @@ bool add_neighbours(ivec2 texel, ivec2 step, vec3 centre, float path, vec3 norma
     }
     vec4 there = photon_points_fetch(other);
     vec3 way = there.xyz - centre;
-    bool alike = there.w == path && dot(photon_normals_fetch(other).xyz, normal) > 0.7;
+    bool alike = there.w == path && dot(octahedral_decode(photon_normals_fetch(other).xy), normal) > 0.7;
     float reach = length(way);
     if (alike && reach < longest * spacing) {
       // On a curved receiver the way is as long as it is, not as the tangent plane shows it.
@@ -36,6 +37,7 @@ void main()
   ivec2 texel = ivec2(gl_FragCoord.xy);
   vec4 point = photon_points_fetch(texel);
   vec4 facing = photon_normals_fetch(texel);
+  vec3 normal = octahedral_decode(facing.xy);
   vec4 flux = photon_fluxes_fetch(texel);
   out_centre = vec4(0.0);
   out_first = vec4(0.0);
@@ -46,10 +48,10 @@ void main()
   }
   vec3 tangent;
   vec3 bitangent;
-  orthonormal_basis(facing.xyz, tangent, bitangent);
+  orthonormal_basis(normal, tangent, bitangent);
   vec3 ellipse = vec3(0.0);  // xx, xy, yy
-  bool along_x = add_neighbours(texel, ivec2(1, 0), point.xyz, point.w, facing.xyz, flux.w, tangent, bitangent, ellipse);
-  bool along_y = add_neighbours(texel, ivec2(0, 1), point.xyz, point.w, facing.xyz, flux.w, tangent, bitangent, ellipse);
+  bool along_x = add_neighbours(texel, ivec2(1, 0), point.xyz, point.w, normal, flux.w, tangent, bitangent, ellipse);
+  bool along_y = add_neighbours(texel, ivec2(0, 1), point.xyz, point.w, normal, flux.w, tangent, bitangent, ellipse);
   float alone = float(!along_x) + float(!along_y);
   ellipse += vec3(1.0, 0.0, 1.0) * (0.5 * alone * flux.w * flux.w);
   ellipse *= widening * widening;
@@ -66,8 +68,8 @@ void main()
   vec2 main_axis = (abs(ellipse.y) > 1e-6 * larger) ? normalize(vec2(larger - ellipse.z, ellipse.y))
                  : ((ellipse.x >= ellipse.z) ? vec2(1.0, 0.0) : vec2(0.0, 1.0));
   vec3 first = main_axis.x * tangent + main_axis.y * bitangent;
-  out_centre = vec4(point.xyz, 1.0);
-  out_first = vec4(first * sqrt(larger), facing.x);
-  out_second = vec4(cross(facing.xyz, first) * sqrt(smaller), facing.y);
-  out_value = vec4(flux.rgb, facing.z);
+  out_centre = vec4(point.xyz, (facing.z < 0.0) ? 0.5 : 1.0 + facing.z);
+  out_first = vec4(first * sqrt(larger), normal.x);
+  out_second = vec4(cross(normal, first) * sqrt(smaller), normal.y);
+  out_value = vec4(flux.rgb, normal.z);
 }

@@ -4,7 +4,8 @@
 // bundle; see addon/lighting/photons.py.
 //
 //   point   xyz where the photon ends; w: its path and the material there as a number above 0; 0: none
-//   normal  xyz of the triangle, towards the photon; w: blur that light and lobes leave to it, m
+//   normal  xy of the triangle, octahedral, towards the photon; z: where the photon came from (pack_normal), if glossy lobes
+//           take it, too (caustics/gloss.glsl), else -1; w: blur that light and lobes leave to it, m
 //   flux    rgb, W; w: how far neighbours would be if nothing had bent them, m
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
@@ -129,6 +130,7 @@ void main()
     lobe_spread = lobe_is_mirror(lobe) ? 0.0 : lobe_width(sqrt(lobe.alpha.x * lobe.alpha.y), false, 1.0);
   }
   bool passes = bends;
+  bool clear = bends && photon_gloss != 0 && lobe_spread == 0.0;  // smooth glass next to the light, then glass alone, which mirrors from within
   if (passes != (dot(onward, geometric_normal) < 0.0)) {
     return;
   }
@@ -177,7 +179,8 @@ void main()
       // The end.
       float lobes = photon_light.spread.y * photon_light.spread.y * blur_squared;
       out_point = vec4(position, 1.0 + mod(path * 37.0 + float(material), PATHS));
-      out_normal = vec4((dot(normal, onward) > 0.0) ? -normal : normal, sqrt(apart * apart + lobes));
+      vec2 facing = octahedral_encode((dot(normal, onward) > 0.0) ? -normal : normal);
+      out_normal = vec4(facing, clear ? pack_normal(-onward) : -1.0, sqrt(apart * apart + lobes));
       out_flux = vec4(flux, width * (parallel ? 1.0 : (away + travelled) / away));
       return;
     }
@@ -224,6 +227,7 @@ void main()
     if (passes != (dot(onward, geometric_normal) < 0.0)) {
       return;
     }
+    clear = clear && (passes || (is_glass && leaves));
     flux *= of_interface * weight * adjoint(came, onward, smooth_normal, geometric_normal);
     path = mod(path * 3.0 + (passes ? 1.0 : 2.0), PATHS);
   }

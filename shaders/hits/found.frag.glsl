@@ -25,15 +25,16 @@ float thinned(float travelled, float further)
 
 // What a ray finds before `limit` in lights and the world. `beyond`: behind glass that a lobe's ray has met, where samples
 // of lamps do not reach that glass blocks, nor (`glass_blocks`) points on emissive meshes, where x is 1, and directions of
-// the world of more luminance than y.
-vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, float lobe_density, float travelled, float limit,
-                 bool with_world)
+// the world of more luminance than y. `photons`: what samples do not reach there arrives as photons.
+vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, bool photons, float lobe_density, float travelled,
+                 float limit, bool with_world)
 {
+  float alone = photons ? 0.0 : 1.0;  // share of rays where samples do not reach
   vec3 sum = vec3(0.0);
   if (with_world && limit >= 1e29 && (bent ? world_transmission : world_glossy) != 0) {
     vec3 radiance = environment_radiance(direction);
     bool asked = !beyond || luminance(radiance) <= glass_blocks.y;
-    sum += radiance * (asked ? share_of_ray(lobe_density, world_samples * environment_density(direction)) : 1.0);
+    sum += radiance * (asked ? share_of_ray(lobe_density, world_samples * environment_density(direction)) : alone);
   }
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
@@ -42,7 +43,7 @@ vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, float lobe
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && (light.flags & (bent ? LIGHT_TRANSMISSION : LIGHT_GLOSSY)) != 0) {
       bool asked = !beyond || (light.flags & LIGHT_GLASS_BLOCKS) == 0;
-      sum += radiance * (asked ? share_of_ray(lobe_density, light.rate * density * thinned(travelled, hit_distance)) : 1.0);
+      sum += radiance * (asked ? share_of_ray(lobe_density, light.rate * density * thinned(travelled, hit_distance)) : alone);
     }
   }
   return sum;
@@ -75,7 +76,8 @@ void main()
   // Frosted glass has asked for lights itself, and has a density of its own.
   bool beyond = path_is_bent(code) && path_mirrors(code) > 0 && travelled > 0.0;
   if (ray_number > 0) {
-    sum += light_found(start, along.xyz, path_is_bent(code), beyond, along.w, travelled, limit, !hole);
+    bool photons = beyond && path_has_photons(code);
+    sum += light_found(start, along.xyz, path_is_bent(code), beyond, photons, along.w, travelled, limit, !hole);
   }
   if (met.w != 0.0 && along.w >= 0.0) {
     vec2 others = (ray_number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample

@@ -16,6 +16,7 @@
 #ifdef HAS_FROZEN_EYES
 #include "edit/frozen.glsl"
 #endif
+#include "caustics/gloss.glsl"
 
 #define LEAST_MIRRORED 0.05  // as in hits/surface.frag.glsl
 
@@ -57,7 +58,7 @@ void main()
   bool clear = path_is_clear(code);
   int mirrored = path_mirrors(code);
   bool edited = path_is_edited(code) || (edits_what_leaves(s) && s.glossy_ior > 1.0);
-  code = (code & 3) + PATH_MIRROR * mirrored;
+  code = (code & 3) + PATH_MIRROR * mirrored + ((path_has_photons(code) && (s.kind == LOBE_REFRACTION || mirrors_within(s))) ? PATH_PHOTONS : 0);
   bool through = path_goes_through(before.w);
   if (code == 0 && !through) {
     return;
@@ -158,6 +159,7 @@ void main()
     code += PATH_MIRROR + (edited ? PATH_EDITED : 0);
 #ifndef ONWARD
     density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
+    code += (photons_shine != 0 && gloss_takes_photons(s)) ? PATH_PHOTONS : 0;
 #endif
   }
   throughput *= weight / max(kept, 1e-6);

@@ -741,6 +741,24 @@ def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
     assert spread[1] == pytest.approx(spread[0], rel=0.1)
 
 
+@pytest.mark.parametrize("roughness", [0.3, 0.6])
+def test_gloss_shows_a_lamp_through_glass_that_bends_nothing_as_without_it(stage, roughness):
+    """Photons bring what shadow rays bring without the ball, and rays of the lobe do not find the lamp once more."""
+    gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=roughness, Color=(1, 1, 1, 1))
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
+    made = ball(stage, glass(stage, 1.0), place=(0, 0, 1.0), segments=48)
+    stage.light("SPOT", location=(0, 0, 2.5), shadow_soft_size=0.1, spot_size=0.8, spot_blend=0.0)
+    stage.camera_above(1.2)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    stage.scene.candela.use_denoise = False
+    through = stage.render(samples=4, size=(24, 24), bounces=3)["combined"][..., 0]
+    assert stage.ledger.row(PHOTONS).state == RAN
+    made.hide_render = True
+    free = stage.render(samples=4, size=(24, 24), bounces=3)["combined"][..., 0]
+    assert through.sum() == pytest.approx(free.sum(), rel=0.04)
+    assert through[10:14, 10:14].mean() == pytest.approx(free[10:14, 10:14].mean(), rel=0.06)
+
+
 @pytest.mark.slow
 def test_points_of_a_wide_lamp_share_a_map_that_has_the_light_of_all(stage, monkeypatch):
     kept, keep = [], CausticMaps.keep
