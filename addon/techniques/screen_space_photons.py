@@ -44,6 +44,7 @@ from ..lighting import caustic_casters
 from ..lighting.caustic_maps import SEEN, CausticMaps
 from ..lighting.path_sources import ShadedLobes
 from ..lighting.photons import FOOTPRINTS, PHOTONS, SPREAD_SIDE, LitView, Photons
+from ..materials import gloss
 from ..scene import acceleration
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
@@ -159,9 +160,9 @@ class ScreenSpacePhotons(Technique):
         # Rays of gloss leave out what photons bring it: of lamps whose light they take glass as opaque for.
         key, rayed = caustic_casters.key_of(light.emitter), frame.service(ShadedLobes) is not None
         known = not rayed or key == caustic_casters.WORLD or key in frame.kept(CausticMaps).lights
-        gloss = on_gloss and known and key != caustic_casters.MESHES
+        onto_gloss = on_gloss and known and key != caustic_casters.MESHES
         interfaces = frame.settings.get(self, "interfaces")
-        for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, gloss):
+        for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, onto_gloss):
             records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
             splats.draw(
                 splat_program(on_gloss),
@@ -181,6 +182,8 @@ class ScreenSpacePhotons(Technique):
 
 
 def _on_gloss(snapshot: Snapshot, casters: caustic_casters.Casters | str) -> bool:
-    """Whether glossy lobes may take photons."""
-    bends = isinstance(casters, caustic_casters.Casters) and bool(casters.refracting)
-    return bends and snapshot.film.caustics_refractive and may_be_glossy(snapshot)
+    """Whether glossy lobes may take photons: none end on mirrors that have a rough lobe beside, whose rays find light."""
+    if isinstance(casters, str) or not casters.refracting or not snapshot.film.caustics_refractive:
+        return False
+    smooth = (max(gloss.mirrors(snapshot.materials[k].graph)) <= caustic_casters.SMOOTH for k in casters.mirrors)
+    return may_be_glossy(snapshot) and all(smooth)
