@@ -312,10 +312,10 @@ class Photons:
 
     def traced(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int,
-        gloss: bool = False,
+        on_gloss: bool = False,
     ) -> Iterator[Bundle]:  # fmt: skip
         """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next.
-        `gloss`: glossy lobes may take those that clear glass lets pass."""
+        `on_gloss`: glossy lobes may take those that clear glass lets pass."""
         target = self._target("_found", light.view.side, len(FOUND))
         for block, bound in self._drawn(frame, technique, casters, light, interfaces):
             textures = {
@@ -328,7 +328,7 @@ class Photons:
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},
                 constants={
-                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": int(gloss)
+                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": int(on_gloss)
                 },
             )  # fmt: skip
             yield self._bundle(frame, technique, target, light)

@@ -182,8 +182,8 @@ class ScreenSpacePhotons(Technique):
 
 
 def _on_gloss(snapshot: Snapshot, casters: caustic_casters.Casters | str) -> bool:
-    """Whether glossy lobes may take photons: none end on mirrors that have a rough lobe beside, whose rays find light."""
+    """Whether glossy lobes may take photons. None end on mirrors, even where those have a rough lobe, too."""
     if isinstance(casters, str) or not casters.refracting or not snapshot.film.caustics_refractive:
         return False
-    smooth = (max(gloss.mirrors(snapshot.materials[k].graph)) <= caustic_casters.SMOOTH for k in casters.mirrors)
+    smooth = (max(gloss.mirrors(snapshot.materials[k].graph)) <= gloss.SMOOTH for k in casters.mirrors)
     return may_be_glossy(snapshot) and all(smooth)

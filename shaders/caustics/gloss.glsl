@@ -1,5 +1,5 @@
 // Which glossy lobes of the picture take photons that clear glass has let pass: those rougher than mirrors, which throw caustics
-// themselves (addon/lighting/caustic_casters.py). Smoother ones see the light through the glass by rays of their own, which
+// themselves (addon/materials/gloss.py). Smoother ones see the light through the glass by rays of their own, which
 // find it well; rays of the others leave it out (hits/found.frag.glsl).
 #define GLOSS_TAKES_FROM 0.251  // roughness
 
