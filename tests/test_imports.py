@@ -158,6 +158,17 @@ def test_module_imports_only_what_its_room_may(path):
     assert not breaches(path, path.read_text(encoding="utf-8"))
 
 
+def test_rooms_stand_in_the_architecture_in_the_order_of_imports():
+    page = (ADDON.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    order = re.findall(r"^    addon/(\w+)/ ", page, re.MULTILINE)
+    found = set()
+    for path in (path for room in order for path in (ADDON / room).rglob("*.py")):
+        own = path.relative_to(ADDON).parts[0]
+        above = {one.room.split(".")[0] for one in imports_of(path, path.read_text(encoding="utf-8")) if one.room}
+        found |= {(own, room) for room in above & set(order) if order.index(room) > order.index(own)}
+    assert len(order) > 12 and not found
+
+
 @pytest.mark.parametrize(
     ("module", "source"),
     [
