@@ -134,9 +134,10 @@ def add(
     for part in range(count):
         names = tuple(seen)[part::count]
         dimmed = () if through is None else tuple(_dimmed(name, WORLD_SEEN in seen) for name in names)
-        passes.add_pixels(
+        passes.each_pixel(
             program(len(names), reach(width), dimmed),
             frame.target(*names),
+            adds=True,
             textures={
                 **{f"seen_{i}": seen[name] for i, name in enumerate(names)},
                 **({"through": through} if dimmed else {}),

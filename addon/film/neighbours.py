@@ -41,9 +41,9 @@ from ..scene.view import VIEW
 APART = 3  # pixels, of those in the second mean
 FEW = 8  # samples at rest in a viewport: up to here it shows indirect light filtered
 MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
-    passes.fullscreen_program(
+    passes.program_of_pixels(
         f"mean of neighbours{of}",
-        "neighbours/mean.frag.glsl",
+        "neighbours/mean.glsl",
         textures=(
             ("RGBA32F", "surface_position"), ("RGBA32F", "surface_normal"), ("RGBA32F", "surface_diffuse"),
             ("RGBA32F", "light_in"),
@@ -129,7 +129,7 @@ def shown_sum(frame: Frame, path: str) -> Iterator[images.Image]:
 def _mean(frame: Frame, program, light, target: images.Target, stride: int, color="surface.diffuse") -> None:
     surfaces = {f"surface_{name}": frame.images[f"surface.{name}"] for name in ("position", "normal")}
     surfaces["surface_diffuse"] = frame.images[color]
-    passes.fullscreen(
+    passes.each_pixel(
         program, target, textures={**surfaces, "light_in": light}, blocks={"film_view": frame.view_block},
         constants={"stride": stride},
     )  # fmt: skip

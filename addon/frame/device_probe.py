@@ -262,7 +262,7 @@ def _steps(target: images.Target, wait: float) -> tuple[float, float]:
         passes.fullscreen(STEP, target, viewport=(0, 0, side, side))
 
     def compute(side: int) -> None:
-        passes.compute(computed, (side, side), images={"to_out_color": target.colors[0]})
+        passes.compute(computed, (side, side), images={"to_out_color": target.colors[0]}, constants={"rows": (0, side)})
 
     # Large from the start: software drivers wait before each dispatch.
     drawn, found = (_each(work, _sides()[3:], lambda side: side * side, wait) for work in (draw, compute))

@@ -38,38 +38,53 @@ def fullscreen_program(name: str, fragment: str, **declared) -> Program:
 
 
 def program_of_pixels(name: str, body: str, **declared) -> Program:
-    """A program for `add_pixels`: the source `body` defines `void run(ivec2 pixel)`, which sets all outputs."""
+    """A program for `each_pixel`: the source `body` defines `void run(ivec2 pixel)`, which sets all outputs."""
     main = f'#include "{body}"\n\nvoid main()\n{{\n  run(ivec2(gl_FragCoord.xy));\n}}\n'
     return fullscreen_program(name, OF_PIXELS + body, snippets=((OF_PIXELS + body, main),), **declared)
 
 
 @lru_cache(maxsize=256)
-def computed(program: Program, formats: tuple[str, ...]) -> Program:
-    """The same program of pixels as a compute program, which adds its outputs to images of these formats."""
-    body = program.fragment.removeprefix(OF_PIXELS)
-    names = [name for _, name in program.outputs]
-    own = "".join(f"vec4 {name};\n" for name in names)
-    added = "".join(f"  imageStore(to_{name}, pixel, imageLoad(to_{name}, pixel) + {name});\n" for name in names)
+def computed(program: Program, formats: tuple[str, ...], adds: bool = False) -> Program:
+    """The same program of pixels as a compute program, which puts its outputs into images of these formats, or adds
+    them there."""
+    body, names = program.fragment.removeprefix(OF_PIXELS), [name for _, name in program.outputs]
+    source = f"computed/{body}, {'added' if adds else 'put'}"
+    outputs = "".join(f"vec4 {name};\n" for name in names)
+    before = [f"imageLoad(to_{name}, pixel) + " if adds else "" for name in names]
+    stored = "".join(f"  imageStore(to_{name}, pixel, {old}{name});\n" for name, old in zip(names, before))
     main = (
-        f'{own}#include "{body}"\n\nvoid main()\n{{\n  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);\n'
-        f"  if (any(greaterThanEqual(pixel, imageSize(to_{names[0]})))) {{\n    return;\n  }}\n"
-        f"  run(pixel);\n{added}}}\n"
+        f'{outputs}#include "{body}"\n\nvoid main()\n{{\n'
+        "  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, rows.x);\n"
+        f"  if (pixel.x >= imageSize(to_{names[0]}).x || pixel.y >= rows.y) {{\n    return;\n  }}\n"
+        f"  run(pixel);\n{stored}}}\n"
     )
+    access = "READ_WRITE" if adds else "WRITE"
     return Program(
-        name=f"{program.name}, computed", compute="computed/" + body, snippets=(("computed/" + body, main),),
-        images=tuple((f"to_{name}", kind, "FLOAT_2D", "READ_WRITE") for name, kind in zip(names, formats)),
-        textures=program.textures, constants=program.constants, blocks=program.blocks, defines=program.defines,
+        name=f"{program.name}, computed{' and added' if adds else ''}", compute=source, snippets=((source, main),),
+        images=tuple((f"to_{name}", kind, "FLOAT_2D", access) for name, kind in zip(names, formats)),
+        textures=program.textures, constants=(*program.constants, ("IVEC2", "rows")), blocks=program.blocks,
+        defines=program.defines,
     )  # fmt: skip
 
 
-def add_pixels(program: Program, target: Target, **bindings) -> None:
-    """Add what a program of pixels (`program_of_pixels`) gives to a target's images: by fragments or by a compute
-    program of the same body, whichever this device runs faster. A card for computing may have few units that draw."""
+def as_run(program: Program) -> Program:
+    """A program as this device runs it, to be compiled ahead."""
+    if not (program.fragment.startswith(OF_PIXELS) and computes_beat_fragments()):
+        return program
+    return computed(program, ("RGBA32F",) * len(program.outputs))
+
+
+def each_pixel(program: Program, target: Target, *, adds: bool = False, rows=None, **bindings) -> None:
+    """Put what a program of pixels (`program_of_pixels`) gives into a target's images, or add it there: by fragments or
+    by a compute program of the same body, whichever this device runs faster. Of some `rows` (from, to) or of all."""
     if not computes_beat_fragments():
-        fullscreen(program, target, blend="ADDITIVE_PREMULT", **bindings)
+        fullscreen(program, target, blend="ADDITIVE_PREMULT" if adds else "NONE", rows=rows, **bindings)
         return
     images = {f"to_{name}": image for (_, name), image in zip(program.outputs, target.colors)}
-    compute(computed(program, tuple(image.format for image in target.colors)), target.size, images=images, **bindings)
+    first, end = rows or (0, target.size[1])
+    constants = {**bindings.pop("constants", {}), "rows": (first, end)}
+    made = computed(program, tuple(image.format for image in target.colors), adds)
+    compute(made, (target.size[0], end - first), images=images, constants=constants, **bindings)
 
 
 COPY = fullscreen_program(

@@ -88,9 +88,9 @@ BEGIN_BESIDE_GRASS = replace(
     BEGIN, name="denoise: light and variance beside grass", textures=(*BEGIN.textures, ("RGBA32F", "surface_lobe")),
     defines=(*BEGIN.defines, ("GRASS", "1")),
 )  # fmt: skip
-LEVEL = passes.fullscreen_program(
+LEVEL = passes.program_of_pixels(
     "denoise: level",
-    "denoise/level.frag.glsl",
+    "denoise/level.glsl",
     textures=(*GUIDES, ("RGBA32F", "light_in")),
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "stride"), ("FLOAT", "tolerance"), ("FLOAT", "sharpness")),
@@ -258,7 +258,7 @@ class Denoise(Technique):
                 constants = {"stride": stride, "tolerance": tolerance, "sharpness": how.sharpness}
                 constants |= {"count": count} if shown else {}
                 for rows in frame.bands(self):
-                    passes.fullscreen(
+                    passes.each_pixel(
                         level, other, rows=rows, blocks=blocks, constants=constants,
                         textures={**guides, **shown, "light_in": light.colors[0]},
                     )  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 
 from addon.film import point_costs
 from addon.frame import device_probe
-from addon.gfx import context, device, passes
+from addon.gfx import context, device, images, passes
 from addon.lighting import visibility
 from addon.snapshot import SnapshotCache, take
 from addon.ui import preferences
@@ -57,21 +57,39 @@ def test_a_choice_differs_between_two_devices_and_the_ledger_says_why(room):
     assert said["tracer"] in room.ledger.text() or said["rasteriser"] in room.ledger.text()
 
 
-def test_pixels_are_drawn_or_computed_alike_as_the_device_says(room, monkeypatch):
-    """The film filter, and what a picture with it is, by fragments and by compute programs of the same body."""
-    dispatched, found = [], {}
-    own = passes.compute
-    monkeypatch.setattr(
-        passes, "compute", lambda program, *a, **b: dispatched.append(program.name) or own(program, *a, **b)
-    )
-    for name, compute in (("drawn", SOFTWARE.fragment), ("computed", 0.1 * SOFTWARE.fragment)):
-        device.use(replace(SOFTWARE, compute=compute))
+@pytest.mark.parametrize(
+    ("samples", "bounces", "gather"),
+    [(2, 0, "denoise: level"), pytest.param(1, 1, "mean of neighbours", marks=pytest.mark.slow)],
+)
+def test_pixels_are_drawn_or_computed_alike_as_the_device_says(room, monkeypatch, samples, bounces, gather):
+    """By fragments and by compute programs of the same body, in rows, too."""
+    dispatched, found, own = [], {}, passes.compute
+
+    def compute(program, *given, **named):
+        dispatched.append(program.name)
+        own(program, *given, **named)
+
+    monkeypatch.setattr(passes, "compute", compute)
+    for name, figure in (("drawn", SOFTWARE.fragment), ("computed", 0.1 * SOFTWARE.fragment)):
+        device.use(replace(SOFTWARE, compute=figure))
         dispatched.clear()
         room.renderer.forget()
-        found[name] = room.render(2, (37, 23))
-        assert any("film filter" in program for program in dispatched) == (name == "computed")
+        found[name] = room.render(samples, (37, 23), bounces=bounces)
+        for asked in ("film filter", gather):
+            assert any(asked in program for program in dispatched) == (name == "computed")
     for name, image in found["drawn"].items():
         np.testing.assert_allclose(found["computed"][name], image, rtol=1e-5, atol=1e-6, err_msg=name)
+
+
+def test_computed_pixels_are_those_of_some_rows(gpu_context):
+    for figure in (SOFTWARE.fragment, 0.1 * SOFTWARE.fragment):
+        device.use(replace(SOFTWARE, compute=figure))
+        with images.borrowed(9, 7, "RGBA32F") as target:
+            target.clear()
+            passes.each_pixel(device_probe.STEP, target, rows=(2, 5))
+            drawn = images.read(target.colors[0])[..., 3]
+        np.testing.assert_array_equal(drawn.sum(axis=1), [0, 0, 9, 9, 9, 0, 0])
+    device.use(None)
 
 
 def test_the_plan_foresees_the_same_choice(room):

@@ -94,5 +94,5 @@ def programs() -> list[Program]:
         made += [materials._surface_program(with_file), materials._caster_program(with_file)]
         made += [materials._emission_program(with_file), materials._opacity_program(with_file)]
     of_pixels = [one for one in made if one.fragment.startswith(passes.OF_PIXELS)]
-    made += [passes.computed(one, ("RGBA32F",) * len(one.outputs)) for one in of_pixels]
+    made += [passes.computed(one, ("RGBA32F",) * len(one.outputs), adds) for one in of_pixels for adds in (False, True)]
     return sorted(dict.fromkeys(made), key=lambda program: (program.name, program.fragment, program.compute))

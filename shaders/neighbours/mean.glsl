@@ -14,9 +14,8 @@ vec3 arriving_at(ivec2 pixel)
   return light;
 }
 
-void main()
+void run(ivec2 pixel)
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = light_in_size();
   vec4 centre = surface_position_fetch(pixel);
   out_arriving = vec4(arriving_at(pixel), 0.0);

@@ -34,9 +34,8 @@ float shown_alike(vec4 one, vec4 other)
 }
 #endif
 
-void main()
+void run(ivec2 pixel)
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = light_in_size();
   vec4 own = light_in_fetch(pixel);
   out_light = own;
