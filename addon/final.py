@@ -33,7 +33,6 @@ from .ui.passes import CAMERA_AXES, CATCHER, GLARE, NOISY, RenderPass
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 TAIL = 0.5  # the same, about
 FEW_SAMPLES, MANY_SAMPLES = 4, 12
-FIRST_COSTS = 1.35  # of a later one, about: it finds what all of them use (1.24 to 1.4 in five scenes)
 TELLING_PART = 0.3  # of the first sample, from which on it tells what one takes
 TELL_S = 0.5  # between two sentences about one sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
@@ -283,7 +282,8 @@ class Inside:
 
     def __init__(self, frame: Frame, now: float):
         self._frame, self._told_at, self._within = frame, now, WithinSample(frame)
-        self._compiled, self._begun = library.compile_count, (now, library.compile_seconds, frame.samples_done)
+        self._compiled, self._first = library.compile_count, frame.samples_done
+        self._looked_at, self._later = (now, library.compile_seconds), 0.0  # `_later`: what a later sample takes of it
         self.each: float | None = None  # seconds of a sample by what the first has taken so far; None: not yet known
 
     @property
@@ -293,15 +293,17 @@ class Inside:
 
     def news(self, now: float) -> str | None:
         """What is being done, now and then."""
+        (before, compiling), self._looked_at = self._looked_at, (now, library.compile_seconds)
+        worked = max(now - before - (library.compile_seconds - compiling), 0.0)
+        is_first = self._frame.samples_done == self._first
+        self._later += worked * (self._within.later(self._frame.at) if is_first else 1.0)
         if now - self._told_at < TELL_S or not self._frame.at:
             return None
         compiles, self._told_at = library.compile_count > self._compiled, now
         self._compiled = library.compile_count
         self._within.look()
-        started, compiled, first = self._begun
-        if self.done - first >= TELLING_PART:
-            worked = now - started - (library.compile_seconds - compiled)
-            self.each = max(worked, 0.0) / (self.done - first) / FIRST_COSTS
+        if self.done - self._first >= TELLING_PART:
+            self.each = self._later / (self.done - self._first)
         return f"compiling shaders for {self._frame.at}" if compiles else self._frame.at
 
 

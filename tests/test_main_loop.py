@@ -8,6 +8,7 @@ import bpy  # noqa: F401 - gpu comes with it
 import pytest
 
 from addon import final, main_loop
+from addon.frame.within_sample import USUALLY_LATER
 
 
 @pytest.fixture
@@ -121,7 +122,8 @@ def test_time_that_is_left_forgets_the_first_sample_once_there_is_another():
 
 
 def test_a_render_says_what_it_does_within_a_sample_and_how_long_it_takes():
-    """Of two techniques that take as long one is done, and half of the other: 3 s for 3/4 of the first sample."""
+    """Of two techniques that take as long one is done, and half of the other: 3 s for 3/4 of the first sample, of which
+    a later one takes the usual share, and nothing of what is found once."""
     technique = namedtuple("Technique", "label name")
     plan = type("Plan", (), {"techniques": [technique("One", "one"), technique("Other", "other")]})
     bands = type("Bands", (), {"part": 0.5})
@@ -129,10 +131,13 @@ def test_a_render_says_what_it_does_within_a_sample_and_how_long_it_takes():
     inside = final.Inside(frame, 100.0)
     assert inside.news(100.1) is None and inside.each is None
     assert inside.news(103.0) == "Other"
-    assert inside.done == pytest.approx(0.75) and inside.each == pytest.approx(4.0 / final.FIRST_COSTS)
+    assert inside.done == pytest.approx(0.75) and inside.each == pytest.approx(4.0 * USUALLY_LATER)
     bands.part = 0.1  # a second pass of the same technique
     inside.news(104.0)
     assert inside.done == pytest.approx(0.75)
     frame.samples_done = 1
     assert inside.done == 1.0
+    plan.techniques = [technique("Light probes", "light_probes")]
+    probes = final.WithinSample(frame)
+    assert probes.later("Light probes") == 0.0
     assert final.sentence(2, 4, 7.0, "Direct light") == "Rendering 2 / 4 samples, 0:07 left, Direct light"

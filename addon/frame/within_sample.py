@@ -12,6 +12,12 @@ USUAL_WORK = {
     "image_space_subsurface": 1.5, "emissive_light": 1.0, "surfaces": 0.3,
 }  # fmt: skip
 LITTLE_WORK = 0.1
+# What a later sample takes of that in the first, which finds what all of them use, about, in the same scenes.
+LATER = {
+    "light_probes": 0.0, "surfaces": 0.4, "shaded_reflections": 0.4, "environment_light": 0.6,
+    "instant_radiosity": 0.75,
+}  # fmt: skip
+USUALLY_LATER = 0.85
 
 
 class WithinSample:
@@ -22,6 +28,7 @@ class WithinSample:
         weights = [USUAL_WORK.get(technique.name, LITTLE_WORK) for technique in frame.plan.techniques]
         labels = [technique.label for technique in frame.plan.techniques]
         self._work = {label: (sum(weights[:k]), weights[k]) for k, label in enumerate(labels)}
+        self._later = {technique.label: LATER.get(technique.name, USUALLY_LATER) for technique in frame.plan.techniques}
         self._whole = sum(weights)
         self._number, self._part = frame.samples_done, 0.0
 
@@ -33,6 +40,10 @@ class WithinSample:
         part = (before + own * rows) / self._whole
         self._part = max(part, self._part if self._number == frame.samples_done else 0.0)
         self._number = frame.samples_done
+
+    def later(self, technique: str) -> float:
+        """What a technique, by its label, takes of a later sample, as a share of what it takes of the first."""
+        return self._later.get(technique, USUALLY_LATER)
 
     @property
     def done(self) -> float:
