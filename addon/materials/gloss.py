@@ -32,6 +32,16 @@ def polish(graph: Graph) -> Iterator[float]:
             yield value(node, "Coat Roughness", 1.0) if value(node, "Coat Weight") >= 0.5 else 1.0
 
 
+def patterned(graph: Graph) -> bool:
+    """Whether the colour of glass is more than a socket's own value."""
+    sockets = [
+        node.inputs.get("Base Color" if node.type == "ShaderNodeBsdfPrincipled" else "Color")
+        for node in graph.nodes.values()
+        if node.type in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction", "ShaderNodeBsdfPrincipled")
+    ]
+    return any(socket is not None and socket.link is not None for socket in sockets)
+
+
 def value(node: Node, name: str, unknown: float = 0.0) -> float:
     """A socket's own value, or `unknown` where it is linked or missing."""
     socket = node.inputs.get(name)

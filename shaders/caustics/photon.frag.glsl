@@ -83,6 +83,24 @@ vec3 mirror_color(int material, float cosine)
   return mix(straight, grazing, pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0));
 }
 
+#ifdef PATTERNED
+// Colour of the glass where a photon leaves it, from what the light's view shows of the casters' last faces; `mean` where it
+// shows another place. `near`: how far apart places of the same texel are, m.
+vec3 color_there(vec3 place, vec3 mean, float share, float near)
+{
+  vec4 p = vec4(place, 1.0);
+  ivec2 size = behind_position_size();
+  float w = dot(film_view.row_w, p);
+  vec2 at = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / max(w, 1e-30) * 0.5 + 0.5) * vec2(size);
+  if (w <= 0.0 || any(lessThan(at, vec2(0.0))) || any(greaterThanEqual(at, vec2(size)))) {
+    return mean;
+  }
+  vec4 there = behind_position_fetch(ivec2(at));
+  bool same = there.w != 0.0 && distance(there.xyz, place) < 4.0 * near;
+  return same ? behind_tint_fetch(ivec2(at)).rgb / max(share, 1e-3) : mean;
+}
+#endif
+
 void main()
 {
   out_point = vec4(0.0);
@@ -171,6 +189,11 @@ void main()
     vec3 of_interface = vec3(1.0);
     bool is_glass = shape.y > 0.0 && interface_of(material, flux, numbers.x, glass, shape, of_interface);
     bool mirrors = !is_glass && body.w > 0.5;
+#ifdef PATTERNED
+    if (is_glass && leaves && interface_table_size().x == 3) {
+      glass.rgb = color_there(position, glass.rgb, shape.y, width);
+    }
+#endif
 #ifdef ABSORBING
     int solid = (leaves && shape.y > 0.0) ? material : solid_around(origin, onward, ray_offset(origin), salt + uint(step));
     flux *= (solid >= 0) ? exp(-interface_table_fetch(ivec2(2, solid)).rgb * t) : vec3(1.0);

@@ -741,6 +741,35 @@ def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
     assert spread[1] == pytest.approx(spread[0], rel=0.1)
 
 
+def test_a_pattern_colours_light_where_it_enters_glass_and_where_it_leaves(stage):
+    """A slab of index 1 between a sun and a floor, red where x < 0 and green beside: light crosses two faces of one."""
+    made = stage.material("ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.0)
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    checker, place = nodes.new("ShaderNodeTexChecker"), nodes.new("ShaderNodeTexCoord")
+    checker.inputs["Scale"].default_value = 0.5
+    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0.5, 0.5, 1), (0.5, 1, 0.5, 1)
+    shift = nodes.new("ShaderNodeMapping")
+    shift.inputs["Location"].default_value = (2.0, 1.0, 1.0)  # a step at x = 0 alone
+    links.new(place.outputs["Object"], shift.inputs["Vector"])
+    links.new(shift.outputs["Vector"], checker.inputs["Vector"])
+    links.new(checker.outputs["Color"], nodes["Glass BSDF"].inputs["Color"])
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, radius=0.1, location=(5, 5, 1))  # no pane alone
+    bpy.context.object.data.materials.append(made)
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0, 0, 0.5))
+    slab = bpy.context.object
+    slab.scale = (1.0, 1.0, 0.1)
+    slab.data.materials.append(made)
+    slab.visible_camera = False
+    stage.floor(2.0)
+    stage.light("SUN", energy=np.pi, angle=0.01)
+    stage.camera_above(1.0)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    found = stage.render(samples=4, size=(24, 24), bounces=3)["diffuse_indirect"][..., :3]
+    sides = sorted((found[8:16, 4:9].mean((0, 1)), found[8:16, 15:20].mean((0, 1))), key=lambda color: color[0])
+    assert sides[1] == pytest.approx([1.0, 0.25, 0.25], abs=0.06)
+    assert sides[0] == pytest.approx([0.25, 1.0, 0.25], abs=0.06)
+
+
 @pytest.mark.parametrize("roughness", [0.3, 0.6])
 def test_gloss_shows_a_lamp_through_glass_that_bends_nothing_as_without_it(stage, roughness):
     """Photons bring what shadow rays bring without the ball, and rays of the lobe do not find the lamp once more."""
