@@ -26,9 +26,7 @@ share out, leave to each: at one sample all of it; points of a light lie so much
 | passes | 2 of the grid's side squared; bytes 10 x 16 per texel |
 
 Bias: footprints blur by about their size, and none of it remains as samples grow. Interfaces behind the first have
-their material's mean index and roughness, none of its bumps, and its mean colour but where light leaves glass by the
-face that is farthest from the light: there a textured colour is that of the place. Light of one interaction with a
-diffuse surface between is left to indirect light.
+their material's means and no bumps; where light leaves by the face farthest from it, the colour is that of the place.
 """
 
 from __future__ import annotations
