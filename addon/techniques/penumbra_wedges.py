@@ -18,7 +18,7 @@ of 2, 3, 5 and 9 random polygons: .0026 .0041 .0093 .0165 (a little too dark).
 For previews of few casters: a light whose edges belong to more than 48 groups has depth complexity sampling instead, as
 have all lights that wedges do not suit. The light is taken as a whole (in closed form) and of one colour. Discs and
 spheres count as squares of their area, turned with the receiver. Alpha casters are tested at 64 points
-(lighting/textured_volumes.py) and their hidden share is added: too dark where both overlap.
+(lighting/textured_volumes.py); with boxes, each that they hide takes what solids leave of it there.
 
 Fails by construction: gloss, whose highlight does not know which part of the light is hidden; textures on the light;
 open curved sheets that fold over themselves, whose layers an area cannot tell apart (depth_complexity.py can).
@@ -63,6 +63,7 @@ UNIONS = (
 )
 COUNTS = tuple(("RGBA32F", f"counts_{letter}") for letter in "abcd")
 CARDS_SHARE = ("R32F", "cards_share")
+CARDS_POINTS = (("UINT_2D", "card_points"), ("RGBA32F", "light_pattern"))  # by boxes: which points cards leave
 
 
 def _count(what: str) -> Program:
@@ -86,13 +87,18 @@ COUNT_QUADS, COUNT_TRIANGLES = _count("quads"), _count("triangles")
 def gathering_areas(tile: int, union: str, cards: bool, standard: bool = False) -> Program:
     """The dispatch that sums up areas and joins groups."""
     textures = [one for one in LIT_TEXTURES if one[1] != "centre_count"]
+    of_cards, constants = ((CARDS_SHARE,), ()) if cards else ((), ())
+    if cards and union == BOXES:
+        of_cards, constants = CARDS_POINTS, (("INT", "card_shape"), ("INT", "card_patterns"))
     return Program(
         name=f"penumbra wedges, {union.lower()}",
         compute="edges/penumbra_wedges.comp.glsl",
-        textures=(*textures, *COUNTS, ("RGBA32F", "groups"), *((CARDS_SHARE,) if cards else ())),
+        textures=(*textures, *COUNTS, ("RGBA32F", "groups"), *of_cards),
         images=(("seen_share", "R32F", "FLOAT_2D", "WRITE"),),
         blocks=(LIGHT_BLOCK,),
-        constants=(("INT", "first_row"), ("INT", "last_row"), ("VEC3", "rectangle_u"), ("VEC3", "rectangle_v")),
+        constants=(
+            ("INT", "first_row"), ("INT", "last_row"), ("VEC3", "rectangle_u"), ("VEC3", "rectangle_v"), *constants
+        ),
         defines=(
             ("TILE", str(tile)), (f"UNION_{union}", "1"), *((("CARDS", "1"),) if cards else ()),
             *((("STANDARD", "1"),) if standard else ()),
@@ -102,6 +108,7 @@ def gathering_areas(tile: int, union: str, cards: bool, standard: bool = False) 
 
 DECLARED = (
     gathering_areas(16, BOXES, False), gathering_areas(8, PRODUCT, True), gathering_areas(16, SUM, False, True),
+    gathering_areas(8, BOXES, True),
 )  # fmt: skip
 
 
@@ -139,7 +146,9 @@ class PenumbraWedges(EdgeShadows):
         emitter = views[0].emitter
         names, table, quads = self._grouped(lit, emitter)
         counts = self._draw_counts(frame, lit, names, quads)
-        cards = self._cards_share(frame, lit, emitter)
+        union = frame.settings.get(self, "union")
+        cards, of_cards = self._cards(frame, lit, union)
+        union = PRODUCT if union == BOXES and CARDS_SHARE[1] in cards else union
         u, v = np.zeros(3), np.zeros(3)
         values = {"group_count": len(names), "shape": edge_tiles.IN_PLANE}
         if emitter.has_span:
@@ -152,14 +161,16 @@ class PenumbraWedges(EdgeShadows):
                 size = lit.values["size"]
                 values["size"] = (size[0], np.tan(min(emitter.radius, 1.5)), *size[2:])
         lit.update(**values)
-        program = gathering_areas(lit.tile, frame.settings.get(self, "union"), bool(cards), not self.accurate(frame))
+        program = gathering_areas(lit.tile, union, bool(cards), not self.accurate(frame))
         textures = {name: image for name, image in lit.textures.items() if name != "centre_count"}
         textures |= {**counts, "groups": table, **cards}
         for first, last in frame.bands(self, "gather"):
             passes.compute(
                 program, (frame.size[0], last - first), textures=textures, images={"seen_share": found},
                 blocks={"edge_light": lit.block},
-                constants={"first_row": first, "last_row": last, "rectangle_u": tuple(u), "rectangle_v": tuple(v)},
+                constants={
+                    "first_row": first, "last_row": last, "rectangle_u": tuple(u), "rectangle_v": tuple(v), **of_cards
+                },
             )  # fmt: skip
             yield
         frame.count(self, "groups", len(names))
@@ -218,11 +229,12 @@ class PenumbraWedges(EdgeShadows):
                     passes.draw(shader, edge_tiles.corner_batch(corners), total)
         return {name: image for (_, name), image in zip(COUNTS, kept)}
 
-    def _cards_share(self, frame: Frame, lit: Lit, emitter: lights.Emitter) -> dict[str, images.Image]:
-        """What alpha casters alone leave of the light, by points; empty without any."""
+    def _cards(self, frame: Frame, lit: Lit, union: str) -> tuple[dict[str, images.Image], dict[str, object]]:
+        """What alpha casters alone leave of the light, by points, and constants; empty without any. By boxes which
+        points they are, unless those lie in no plane."""
         cards = self.card_words(frame, lit)
         if not cards:
-            return {}
+            return {}, {}
         texels, shape = shared_patterns(frame, lit.extent, CARD_POINTS, 16)
         values = dict(lit.values)
         lit.update(
@@ -231,18 +243,25 @@ class PenumbraWedges(EdgeShadows):
         )  # fmt: skip
         none = self.tiles.kept("no layers", *frame.size, "R16F")
         images.Target((none,)).clear()
-        alone = self.tiles.kept("cards share", *frame.size, CARDS_SHARE[0])
-        program = gathering(CARD_POINTS, lit.tile, False, True, space=shape >= edge_tiles.BALL_DISC)
+        width, height = frame.size
+        space, pattern = shape >= edge_tiles.BALL_DISC, images.upload(texels)
+        bits = union == BOXES and not space
+        if bits:
+            found = {"seen_points": self.tiles.kept("cards points", width, 2 * height, "R32UI")}
+            normal = {}
+        else:
+            found = {"seen_share": self.tiles.kept("cards share", width, height, CARDS_SHARE[0])}
+            normal = {"surface_normal": frame.images["surface.normal"]}
         passes.compute(
-            program, frame.size, images={"seen_share": alone},
-            textures={
-                **lit.textures, "centre_count": none, "light_pattern": images.upload(texels), **cards,
-                "surface_normal": frame.images["surface.normal"],
-            },
+            gathering(CARD_POINTS, lit.tile, bits, True, space=space), frame.size, images=found,
+            textures={**lit.textures, "centre_count": none, "light_pattern": pattern, **cards, **normal},
             blocks={"edge_light": lit.block}, constants={"first_row": 0, "last_row": frame.size[1]},
         )  # fmt: skip
         lit.update(**values)
-        return {CARDS_SHARE[1]: alone}
+        if bits:
+            of_cards = {"card_shape": shape, "card_patterns": len(texels)}
+            return {"card_points": found["seen_points"], "light_pattern": pattern}, of_cards
+        return {CARDS_SHARE[1]: found["seen_share"]}, {}
 
     def release(self) -> None:
         super().release()

@@ -180,13 +180,36 @@ void main()
     share = clamp(product, 0.0, 1.0);
 #else
     share = clamp(1.0 - 0.25 * (hidden_all[0] + hidden_all[1] + hidden_all[2] + hidden_all[3]), 0.0, 1.0);
+#ifdef CARDS
+    // Each point that cards hide takes what solids leave of it: all outside of their box, else as they fill that.
+    LightFrame facing = light_frame(c);
+    vec3 u = (card_shape == IN_PLANE) ? edge_light.half_u.xyz : facing.u;
+    vec3 v = (card_shape == IN_PLANE) ? edge_light.half_v.xyz : facing.v;
+    int own_pattern = ((pixel.x & 3) + 4 * (pixel.y & 3)) % card_patterns;
+    uvec2 seen = uvec2(card_points_fetch(pixel).x, card_points_fetch(pixel + ivec2(0, size.y)).x);
+    float taken = 0.0;
+    for (int k = 0; k < 64; k++) {
+      if ((((k < 32) ? seen.x : seen.y) & (1u << uint(k & 31))) != 0u) {
+        continue;
+      }
+      vec4 pair = light_pattern_fetch(ivec2(k >> 1, own_pattern));
+      vec2 along = ((k & 1) == 0) ? pair.xy : pair.zw;
+      vec3 offset = along.x * u + along.y * v;
+      vec2 place = vec2(dot(offset, to_x), dot(offset, to_y));
+      int q = ((place.x < 0.0) ? 1 : 0) + ((place.y < 0.0) ? 2 : 0);
+      vec2 inside = min(abs(place), vec2(1.0));
+      vec2 side = max(high_all[q] - low_all[q], vec2(0.0));
+      bool boxed = all(greaterThanEqual(inside, low_all[q])) && all(lessThanEqual(inside, high_all[q]));
+      taken += boxed ? 1.0 - hidden_all[q] / max(side.x * side.y, max(hidden_all[q], 1e-6)) : 1.0;
+    }
+    share = clamp(share - taken / 64.0, 0.0, 1.0);
+#endif
 #endif
   }
 #ifdef CARDS
-  // Where on the light cards and solids hide it is known of neither: leaves lie before a trunk as often as beside it.
-#ifdef UNION_SUM
+#if defined(UNION_SUM)
   share = clamp(share + cards_share_fetch(pixel).x - 1.0, 0.0, 1.0);
-#else
+#elif defined(UNION_PRODUCT)
   share *= cards_share_fetch(pixel).x;
 #endif
 #endif

@@ -228,9 +228,10 @@ def test_alpha_casters_before_a_solid_let_their_share_of_the_rest_pass(by_wedges
     assert (expected - share(stage, size)).mean() > 0.05
 
 
-def test_alpha_casters_are_added_in_a_plain_sum(by_wedges):
+@pytest.mark.parametrize("union", ["BOXES", "SUM"])
+def test_alpha_casters_beside_a_solid_are_added(by_wedges, union):
     stage = by_wedges
-    stage.scene.candela.penumbra_wedges_union = "SUM"
+    stage.scene.candela.penumbra_wedges_union = union
     stage.floor()
     half_plane(stage, x=-0.2)
     sheet = with_alpha(stage, np.arange(64)[None] * np.ones((64, 1)) < 32, "Closest")
@@ -243,6 +244,31 @@ def test_alpha_casters_are_added_in_a_plain_sum(by_wedges):
     # From x the plane hides the lamp up to -0.4 - x, the opaque half of the card what lies beyond -x.
     expected = np.clip(np.minimum(0.5, -x) - np.maximum(-0.5, -0.4 - x), 0, 1)
     assert np.abs(share(stage, size) - expected).mean() < 0.02
+
+
+@pytest.mark.slow
+def test_leaves_about_a_trunk_count_by_where_on_the_light_they_lie(by_wedges):
+    """RMS .041 of the mean by boxes beside 48 points, one by one; .042 by the product, .068 by the sum."""
+    stage, random = by_wedges, np.random.default_rng(3)
+    stage.floor()
+    square_of = [(-0.12, -0.12), (0.12, -0.12), (0.12, 0.12), (-0.12, 0.12)]
+    sides = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
+    trunk = stage.mesh([(*xy, z) for z in (0.0, 1.6) for xy in square_of], [*sides, (4, 5, 6, 7), (3, 2, 1, 0)])
+    trunk.visible_camera = False
+    leaf = with_alpha(stage, 1.0 * (np.hypot(*np.mgrid[-1:1:32j, -1:1:32j]) < 0.7), "Closest")
+    for _ in range(40):
+        place, turn = random.normal(0, 0.35, 3) + (0, 0, 1.3), random.uniform(0, 6, 3)
+        stage.card(leaf, 0, 1, location=tuple(place), turn=tuple(turn), scale=(0.25, 0.25, 1)).visible_camera = False
+    square(stage)
+    stage.camera_above(span=2.5)
+    settings, errors = stage.scene.candela, {}
+    before, settings.slot_shadow = settings.slot_shadow, "accumulated_maps"
+    expected = share(stage, (48, 48), samples=48)
+    settings.slot_shadow = before
+    for union in ("BOXES", "PRODUCT", "SUM"):
+        settings.penumbra_wedges_union = union
+        errors[union] = np.sqrt(((share(stage, (48, 48)) - expected) ** 2).mean()) / expected.mean()
+    assert errors["BOXES"] < errors["PRODUCT"] < 0.7 * errors["SUM"]
 
 
 def test_a_body_of_many_layers_hides_the_light(by_wedges):
