@@ -142,7 +142,7 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         looks_through = space.camera if space.use_local_camera else depsgraph.scene.camera
         if looks_through is not None and looks_through.type != "CAMERA":
             looks_through = None
-    hidden, shown = _hidden(space), None
+    hidden, shown = _hidden(space, depsgraph), None
     if hidden:
         shown = lambda shown_object: shown_object.visible_in_viewport_get(space)  # noqa: E731
     if viewport.hidden != hidden:
@@ -179,11 +179,17 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
 _KINDS = [p.identifier for p in bpy.types.SpaceView3D.bl_rna.properties if p.identifier.startswith("show_object_view")]
 
 
-def _hidden(space) -> tuple[str, ...]:
-    """Names of what the region's own settings hide: other than in local view or in its collections, and kinds."""
+def _hidden(space, depsgraph) -> tuple[str, ...]:
+    """Names of what the region's own settings hide: other than in local view or in its collections, and kinds; and
+    whether the eye of a collection is closed, whose objects Blender lists nevertheless."""
     own = [name for name in ("local_view", "use_local_collections") if getattr(space, name, None)]
     kinds = [name for name in _KINDS if not getattr(space, name, True)]
-    return (*own, *kinds)
+    closed = ("collections",) if _closes_eyes(depsgraph.view_layer_eval.layer_collection) else ()
+    return (*own, *kinds, *closed)
+
+
+def _closes_eyes(layer_collection) -> bool:
+    return any(one.hide_viewport or _closes_eyes(one) for one in layer_collection.children)
 
 
 def render_border(depsgraph, space, view: Camera, looks_through, size: tuple[int, int]):

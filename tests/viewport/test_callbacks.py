@@ -178,6 +178,27 @@ def test_what_the_region_hides_is_asked_for_and_starts_anew(window, monkeypatch)
     assert asked[0] is None and asked[1] is not None
 
 
+def test_objects_of_a_collection_whose_eye_is_closed_are_left_out(window):
+    """Blender lists them in the evaluated scene nevertheless, and asks each space whether it shows them."""
+    screens = (area for screen in bpy.data.screens for area in screen.areas)
+    window.space_data = next(area.spaces.active for area in screens if area.type == "VIEW_3D")
+    cube, layer = bpy.data.objects["Cube"], window.scene.view_layers[0]
+    things = bpy.data.collections.new("Things")
+    window.scene.collection.children.link(things)
+    for one in tuple(cube.users_collection):
+        one.objects.unlink(cube)
+    things.objects.link(cube)
+    made, seen = Engine(), []
+    for closed in (False, True, False):
+        layer.layer_collection.children["Things"].hide_viewport = closed
+        layer.update()
+        window.update(made)
+        window.draw(made)
+        (kept,) = viewport._viewports.values()
+        seen.append(len(kept._snapshot.instances))
+    assert seen == [seen[0], seen[0] - 1, seen[0]]
+
+
 def test_pixel_size_of_blender_is_followed(window):
     window.scene.render.preview_pixel_size = "4"
     made = Engine()
