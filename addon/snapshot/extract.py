@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ..materials import working_space
-from ..materials.nodes.inputs import STRAND
+from ..materials.nodes.inputs import ROUND
 from . import camera as cameras
 from . import motion as motions
 from .cache import MeshEntry, Placed, SnapshotCache
@@ -235,15 +235,15 @@ def _meshes(
 def _fibres_without_strands(
     shading: ShadingTable, shown_with: dict[int, set[int]], meshes: dict[int, Mesh]
 ) -> list[Note]:
-    """What is to be said of materials of fibres on what is no strand."""
-    bare = [used for pointer, used in shown_with.items() if STRAND not in meshes[pointer].colors]
+    """What is to be said of materials of fibres on points, which have no direction."""
+    bare = [used for pointer, used in shown_with.items() if ROUND not in meshes[pointer].colors]
     text = (
-        "Principled Hair is drawn as fibres on strands alone; a mesh with it is a diffuse surface that lets half of "
-        "its light through, far brighter than Cycles'. Use hair curves, or Principled BSDF on meshes."
+        "Principled Hair is drawn as fibres on strands and meshes alone; a point cloud with it is a diffuse surface "
+        "that lets half of its light through. Use hair curves, or Principled BSDF on points."
     )
     notes = []
     for index in sorted(set().union(*bare)):
-        if STRAND not in shading.wanted[index].attributes:
+        if ROUND not in shading.wanted[index].attributes:
             continue
         material = shading.materials[index]
         fibres = [node.label for node in material.graph.nodes.values() if node.type == "ShaderNodeBsdfHairPrincipled"]

@@ -223,6 +223,8 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
     normals = _unit(raw.corner_normals)
     if raw.flat:
         raw, normals, triangles = _folded(raw, positions, normals, triangles)
+    if ROUND in wanted.attributes and mesh.id_type == "MESH":
+        raw, normals, triangles = _with_first_edges(raw, positions, normals, triangles)
     low, high = _bounds(positions, raw.corner_vertices, triangles)
     if CORNER in wanted.attributes and mesh.id_type == "MESH":
         colors = np.ones((len(raw.corner_vertices), 4), np.float32)
@@ -273,12 +275,31 @@ def _folded(raw: RawMesh, positions: np.ndarray, normals: np.ndarray, triangles:
     normals = np.concatenate([normals, np.repeat(own[folded], 3, axis=0)])
     triangles = triangles.copy()
     triangles[folded] = count + np.arange(len(source) - count, dtype=triangles.dtype).reshape(-1, 3)
-    at_corners = {
-        "corner_vertices": raw.corner_vertices[source],
-        "uv_maps": {name: values[source] for name, values in raw.uv_maps.items()},
-        "colors": {name: values[source] for name, values in raw.colors.items()},
-    }
-    return replace(raw, **at_corners), normals, triangles
+    return _with_corners(raw, source), normals, triangles
+
+
+def _with_corners(raw: RawMesh, source: np.ndarray) -> RawMesh:
+    """`raw` with the corners `source` (C',) of its own."""
+    return replace(
+        raw,
+        corner_vertices=raw.corner_vertices[source],
+        uv_maps={name: values[source] for name, values in raw.uv_maps.items()},
+        colors={name: values[source] for name, values in raw.colors.items()},
+    )
+
+
+def _with_first_edges(raw: RawMesh, positions: np.ndarray, normals: np.ndarray, triangles: np.ndarray):
+    """`raw`, its normals and triangles, with corners of their own for all triangles, whose ROUND is the first edge.
+
+    Along it Principled Hair has its fibre on a mesh: Cycles takes the derivative by a triangle's own first coordinate.
+    """
+    source = triangles.reshape(-1)
+    a, b = np.moveaxis(positions[raw.corner_vertices[triangles[:, :2]]], 1, 0)
+    edges = np.zeros((len(triangles), 4), np.float32)
+    edges[:, :3] = b - a
+    raw = _with_corners(raw, source)
+    colors = {**raw.colors, ROUND: np.repeat(edges, 3, axis=0)}
+    return replace(raw, colors=colors), normals[source], np.arange(len(source), dtype=triangles.dtype).reshape(-1, 3)
 
 
 def _broken_note(subject: str, count: int) -> Note:

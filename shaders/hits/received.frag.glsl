@@ -126,8 +126,10 @@ vec3 indirect_light(Receiver r, uvec3 roll)
   }
   vec3 lit = r.surface.normal;
   vec3 side = r.surface.geometric_normal;
+  vec3 position = r.surface.position;
   if (reflection.through > 0.0) {
     bool passes = to_unit(hash3(roll).x) < reflection.through;
+    position -= passes ? max(-reflection.rough, 0.0) * side : vec3(0.0);
     lit = passes ? -lit : lit;
     side = passes ? -side : side;
   }
@@ -135,13 +137,13 @@ vec3 indirect_light(Receiver r, uvec3 roll)
     return sum;
   }
   vec3 from;
-  vec3 arriving = virtual_irradiance(r.surface.position, lit, glossy_radius, r.mirrored > 0, roll.z, from);
+  vec3 arriving = virtual_irradiance(position, lit, glossy_radius, r.mirrored > 0, roll.z, from);
   sum += arriving * reflection_of(reflection, lit, from, r.viewer);
   Walk walk;
   walk.direction = cosine_direction(lit, vec2(to_unit(roll.x), to_unit(roll.y)));
   vec3 weight = PI * reflection_of(reflection, lit, walk.direction, r.viewer);
   if (dot(walk.direction, side) > 0.0 && max_component(weight) > 0.0) {
-    walk.origin = ray_origin(r.surface.position, side);
+    walk.origin = ray_origin(position, side);
     walk.bounce = 1;
     walk.whole = false;
     walk.has_met = false;

@@ -1,11 +1,13 @@
 // What surfaces reflect, reduced to what paths need: how much of the light that meets them leaves them again, and a glossy
 // lobe of few numbers.
 
+#include "lib/hair.glsl"
+
 // A diffuse part and one lobe of microfacets, whose reflectance runs from `straight` at normal incidence to `grazing`.
 struct Reflection {
   vec3 diffuse;  // albedo, with what passes to the other side
   float through; // share of it that passes
-  float rough;   // of the diffuse part
+  float rough;   // of the diffuse part; below 0 a strand of hair, which is so thick, m
   vec3 straight;
   vec3 grazing;
   float alpha;
@@ -73,6 +75,11 @@ Reflection surface_reflection(Surface s, float mu)
     r.diffuse += s.glossy_weight * soft_lobe_albedo(s);
     if (s.kind == LOBE_TRANSLUCENT) {
       r.through = luminance(s.glossy_weight) / max(luminance(r.diffuse), 1e-30);
+    }
+    if (s.kind == LOBE_TOON && s.glossy_tint.z < 0.9) {
+      float thick = 2.0 * hair_radius(s.glossy_edge);
+      r.through = hair_through(s.glossy_ior) * luminance(s.glossy_weight) / max(luminance(r.diffuse), 1e-30);
+      r.rough = (thick > 2.0 * HAIR_FLAT) ? -thick : r.rough;
     }
   }
   else if (s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0) {

@@ -57,7 +57,7 @@ void main()
         throughput /= chance;
       }
       direction = onward;
-      origin = ray_origin(met.position, met.lit);
+      origin = ray_origin(lit_position(met), met.lit);
     }
     if (!trace_vertex(origin, direction, 1e29, roll.z, met, t)) {
       break;

@@ -80,11 +80,8 @@ void main()
         side *= turn;
         glossy = soft.glossy;
         if (soft.fibre) {
-          float height = 1.0 - 2.0 * u.x;
-          float ring = sqrt(max(1.0 - height * height, 0.0));
-          direction = vec3(ring * cos(2.0 * PI * u.y), ring * sin(2.0 * PI * u.y), height);
+          direction = fibre_sample(soft, vec4(to_unit(roll.x), to_unit(roll.y), u), weight);
           start = fibre_start(soft, s.position, direction, side);
-          weight = soft_reflection(soft, direction) * (4.0 * PI);
         }
         else if (dot(direction, side) > 0.0) {
           weight = soft_reflection(soft, direction) * PI / max(turn * dot(direction, soft.normal), 1e-6);

@@ -49,7 +49,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     sum += throughput * direct_reflected(walk.met, -walk.direction, 1, roll.x);
     if (walk.bounce < bounces) {
       vec3 from;
-      vec3 arriving = virtual_irradiance(walk.met.position, walk.met.lit, reach, walk.bounce > 0, roll.z, from);
+      vec3 arriving = virtual_irradiance(lit_position(walk.met), walk.met.lit, reach, walk.bounce > 0, roll.z, from);
       sum += throughput * even_share(walk.met) * arriving * reflection_of(walk.met.reflection, walk.met.lit, from, -walk.direction);
     }
     if (walk.bounce == 1) {
@@ -62,7 +62,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     vec3 onward = cosine_direction(walk.met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
     throughput *= even_share(walk.met) * PI * reflection_of(walk.met.reflection, walk.met.lit, onward, -walk.direction);
     walk.direction = onward;
-    walk.origin = ray_origin(walk.met.position, walk.met.lit);
+    walk.origin = ray_origin(lit_position(walk.met), walk.met.lit);
   }
   return sum;
 }

@@ -176,6 +176,13 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   return true;
 }
 
+// Where light reaches what a ray has met: on the far side of a strand of hair that it shines through.
+vec3 lit_position(Vertex met)
+{
+  float thick = (dot(met.lit, met.normal) < 0.0) ? max(-met.reflection.rough, 0.0) : 0.0;
+  return met.position - thick * met.normal;
+}
+
 // What media let pass of light that comes along a ray from `limit`.
 vec3 passing_media(vec3 origin, vec3 direction, float limit, uint salt)
 {
@@ -256,7 +263,7 @@ float even_share(Vertex met)
 // is traced: pixels that a processor runs together then trace together.
 vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
 {
-  vec3 position = met.position;
+  vec3 position = lit_position(met);
   vec3 normal = safe_normalize(met.turned);
   float left = length(met.turned);
   vec3 origin = ray_origin(position, met.lit);

@@ -105,6 +105,17 @@ vec2 hair_tilted(vec2 light, float angle)
   return vec2(light.x * c + light.y * s, abs(light.y * c - light.x * s));
 }
 
+// Of the lobes R, TT, TRT and the rest: tilt, variance along the fibre.
+vec4 hair_tilts(float tilt)
+{
+  return tilt * vec4(2.0, -1.0, -4.0, 0.0);
+}
+
+vec4 hair_variances(float roughness, float narrowing)
+{
+  return vec4(hair_variance(roughness * narrowing), hair_variance(roughness) * vec3(0.25, 4.0, 4.0));
+}
+
 // f * cos towards a viewer from `light`, both unit; `tilt` of the scales, `narrowing` of R's roughness.
 vec3 hair_scattering(HairLobes lobes, vec3 tangent, vec3 view, vec3 light, vec2 roughness, float tilt, float narrowing)
 {
@@ -115,13 +126,55 @@ vec3 hair_scattering(HairLobes lobes, vec3 tangent, vec3 view, vec3 light, vec2 
   vec3 across = safe_normalize(cross(tangent, view));
   vec3 away = cross(tangent, across);
   float turn = atan(dot(light, away), dot(light, across)) + 0.5 * PI;
-  float variance = hair_variance(roughness.x);
+  vec4 wide = hair_variances(roughness.x, narrowing);
+  vec4 tilts = hair_tilts(tilt);
   float scale = hair_scale(roughness.y);
-  float narrow = hair_variance(roughness.x * narrowing);
-  return lobes.mirrored * (hair_along(hair_tilted(lit, 2.0 * tilt), seen, narrow) * hair_around(turn, 0.0, scale, lobes))
-         + lobes.through * (hair_along(hair_tilted(lit, -tilt), seen, 0.25 * variance) * hair_around(turn, 1.0, scale, lobes))
-         + lobes.returned * (hair_along(hair_tilted(lit, -4.0 * tilt), seen, 4.0 * variance) * hair_around(turn, 2.0, scale, lobes))
-         + lobes.rest * (hair_along(lit, seen, 4.0 * variance) / (2.0 * PI));
+  return lobes.mirrored * (hair_along(hair_tilted(lit, tilts.x), seen, wide.x) * hair_around(turn, 0.0, scale, lobes))
+         + lobes.through * (hair_along(hair_tilted(lit, tilts.y), seen, wide.y) * hair_around(turn, 1.0, scale, lobes))
+         + lobes.returned * (hair_along(hair_tilted(lit, tilts.z), seen, wide.z) * hair_around(turn, 2.0, scale, lobes))
+         + lobes.rest * (hair_along(lit, seen, wide.w) / (2.0 * PI));
+}
+
+// A direction that light comes from, about as often as hair_scattering is large: `u` along the fibre (two numbers), around
+// it, and which lobe. `weight`: f * cos over the density.
+vec3 hair_sample(HairLobes lobes, vec3 tangent, vec3 view, vec2 roughness, float tilt, float narrowing, vec4 u,
+                 out vec3 weight)
+{
+  vec4 shares = vec4(max_component(lobes.mirrored), max_component(lobes.through), max_component(lobes.returned),
+                     max_component(lobes.rest));
+  shares /= max(shares.x + shares.y + shares.z + shares.w, 1e-20);
+  vec4 sums = vec4(shares.x, shares.x + shares.y, shares.x + shares.y + shares.z, 1.0);
+  int lobe = (u.w < sums.x) ? 0 : ((u.w < sums.y) ? 1 : ((u.w < sums.z) ? 2 : 3));
+  vec4 wide = hair_variances(roughness.x, narrowing);
+  vec4 tilts = hair_tilts(tilt);
+  float scale = hair_scale(roughness.y);
+  float v = wide[lobe];
+  float sine_view = clamp(dot(tangent, view), -1.0, 1.0);
+  vec2 seen = vec2(sine_view, sqrt(max(1.0 - sine_view * sine_view, 0.0)));
+  float cosine = clamp(1.0 + v * log(max(u.x + (1.0 - u.x) * exp(-2.0 / v), 1e-30)), -1.0, 1.0);
+  float sine = -cosine * seen.x + sqrt(max(1.0 - cosine * cosine, 0.0)) * cos(2.0 * PI * u.y) * seen.y;
+  float angle = asin(clamp(sine, -1.0, 1.0)) - tilts[lobe];
+  vec2 lit = vec2(sin(angle), abs(cos(angle)));
+  float turn = 2.0 * PI * u.z;
+  if (lobe < 3) {
+    float edge = 1.0 / (1.0 + exp(PI / scale));
+    float below = clamp(mix(edge, 1.0 - edge, u.z), 1e-6, 1.0 - 1e-6);
+    turn = scale * log(below / (1.0 - below)) + float(lobe) * (2.0 * lobes.inside + PI) - 2.0 * lobes.entry;
+  }
+  vec3 across = safe_normalize(cross(tangent, view));
+  vec3 away = cross(tangent, across);
+  float around = turn - 0.5 * PI;
+  vec3 light = lit.x * tangent + lit.y * (cos(around) * across + sin(around) * away);
+  float density = shares.w * hair_along(lit, seen, wide.w) / (2.0 * PI);
+  vec3 sum = lobes.rest * (hair_along(lit, seen, wide.w) / (2.0 * PI));
+  for (int k = 0; k < 3; k++) {
+    vec2 tilted = hair_tilted(lit, tilts[k]);
+    float value = hair_along(tilted, seen, wide[k]) * hair_around(turn, float(k), scale, lobes);
+    density += shares[k] * value * tilted.y / max(lit.y, 1e-4);
+    sum += ((k == 0) ? lobes.mirrored : ((k == 1) ? lobes.through : lobes.returned)) * value;
+  }
+  weight = (density > 0.0) ? sum / density : vec3(0.0);
+  return light;
 }
 
 // How far off its axis a view meets a fibre, in radii.
@@ -144,4 +197,21 @@ vec3 hair_unpack(float stored)
   float y = floor((stored - 1.0 - 65536.0 * z) / 256.0);
   vec3 root = vec3(stored - 1.0 - 256.0 * (y + 256.0 * z), y, z) / 255.0;
   return root * root;
+}
+
+// Radius of a fibre, m, from its lobe's edge; below HAIR_FLAT it is a triangle of a mesh.
+#define HAIR_FLAT 1e-12
+
+float hair_radius(vec3 edge)
+{
+  float code = floor(edge.y * 127.0 + 0.5) * 128.0 + floor(edge.z * 127.0 + 0.5);
+  return 0.5 * exp2(code / HAIR_STEPS - HAIR_THINNEST);
+}
+
+// Of what a fibre sends on of even light, the part that shines through. `stored`: what hair_pack returned.
+float hair_through(float stored)
+{
+  vec3 passing = pow(hair_unpack(stored), vec3(1.57));  // half the mean chord
+  vec3 through = 0.85 * passing;
+  return luminance(through) / luminance(vec3(0.08) + through + 0.08 * through * passing);
 }

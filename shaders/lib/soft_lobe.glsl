@@ -31,7 +31,6 @@ void soft_fibre(inout SoftLobe lobe, Surface s)
   vec3 root = sqrt(s.glossy_tint);
   float level = floor(root.z * 255.0 + 0.5);
   float narrowing = floor(0.5 * level);
-  float code = floor(s.glossy_edge.y * 127.0 + 0.5) * 128.0 + floor(s.glossy_edge.z * 127.0 + 0.5);
   vec3 side;
   vec3 up;
   orthonormal_basis(s.glossy_normal, side, up);
@@ -39,7 +38,7 @@ void soft_fibre(inout SoftLobe lobe, Surface s)
   lobe.tangent = (cos(angle) * side + sin(angle) * up) * ((level > 2.0 * narrowing + 0.5) ? 1.0 : -1.0);
   lobe.shape = vec2(s.glossy_roughness, s.glossy_anisotropy);
   lobe.scales = vec2((root.y - 0.5) * HAIR_TILTS, narrowing / HAIR_NARROWING);
-  lobe.radius = 0.5 * exp2(code / HAIR_STEPS - HAIR_THINNEST);
+  lobe.radius = hair_radius(s.glossy_edge);
   vec3 absorption = -log(max(hair_unpack(s.glossy_ior), vec3(1e-6)));
   lobe.hair = hair_lobes(dot(lobe.tangent, lobe.view), hair_beside(lobe.tangent, lobe.normal, lobe.view),
                          1.0 + HAIR_IORS * root.x, absorption);
@@ -121,9 +120,20 @@ float toon_reflection(SoftLobe lobe, vec3 light)
   return shade / (2.0 * PI * max(1.0 - cos(outer), 1e-6));
 }
 
+// Whether a fibre is a triangle of a mesh, which is flat and has two sides.
+bool fibre_is_flat(SoftLobe lobe)
+{
+  return lobe.radius < HAIR_FLAT;
+}
+
 // As bump_shadowing (lib/brdf.glsl): nothing passes between a surface and its own bumps, and what is diffuse is dimmed.
+// Cycles takes the direction across view and fibre for a bumped normal of fibres on meshes.
 float soft_bump_shadowing(SoftLobe lobe, vec3 light)
 {
+  if (lobe.fibre && fibre_is_flat(lobe)) {
+    vec3 across = cross(lobe.tangent, lobe.view);
+    return (dot(across, light) * dot(lobe.normal, light) * dot(across, lobe.normal) < 0.0) ? 0.0 : 1.0;
+  }
   if (lobe.bump <= 0.0) {
     return 1.0;
   }
@@ -157,6 +167,14 @@ vec3 soft_shape(SoftLobe lobe, vec3 light)
   return lobe.weight * toon_reflection(lobe, light);
 }
 
+// A direction that a fibre takes light from; `weight`: f * cos over its density.
+vec3 fibre_sample(SoftLobe lobe, vec4 u, out vec3 weight)
+{
+  vec3 direction = hair_sample(lobe.hair, lobe.tangent, lobe.view, lobe.shape, lobe.scales.x, lobe.scales.y, u, weight);
+  weight *= lobe.weight;
+  return direction;
+}
+
 // Where a ray along `direction` leaves a fibre, which does not shadow itself: on the far side for light that shines through.
 // `facing`: the fibre's normal there.
 #define FIBRE_CLEAR 1.15  // radii: beyond the corners of a tube of few sides
@@ -165,6 +183,9 @@ vec3 fibre_start(SoftLobe lobe, vec3 position, vec3 direction, out vec3 facing)
 {
   vec3 across = direction - lobe.tangent * dot(direction, lobe.tangent);
   facing = (dot(across, across) > 1e-12) ? normalize(across) : lobe.normal;
+  if (fibre_is_flat(lobe)) {
+    facing = (dot(direction, lobe.normal) < 0.0) ? -lobe.normal : lobe.normal;
+  }
   return position + (facing * FIBRE_CLEAR - lobe.normal) * lobe.radius;
 }
 

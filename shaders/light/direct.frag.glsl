@@ -146,7 +146,9 @@ void main()
       }
 #ifdef SOFT_LOBES
       if (soft.exists) {
-        vec3 from_soft = soft_reflection(soft, direction) * arriving;
+        // Cycles draws the world's light of fibres from the fibre.
+        bool drawn_from = soft.fibre && LIGHT_IS(light, LIGHT_DIRECTION);
+        vec3 from_soft = (drawn_from ? soft_shape(soft, direction) : soft_reflection(soft, direction)) * arriving;
         from_diffuse += ((light.flags & LIGHT_DIFFUSE) != 0 && !soft.glossy) ? from_soft : vec3(0.0);
         from_glossy += ((light.flags & LIGHT_GLOSSY) != 0 && soft.glossy) ? from_soft : vec3(0.0);
       }

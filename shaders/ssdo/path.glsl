@@ -29,7 +29,7 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
     }
     throughput /= stay;
     direction = onward;
-    origin = ray_origin(met.position, met.lit);
+    origin = ray_origin(lit_position(met), met.lit);
   }
   return sum;
 }

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.materials.nodes.inputs import ROUND
 from addon.snapshot import SnapshotCache
 from addon.snapshot.strands import ROUND_SIDES, STEPS, spheres, tubes
 
@@ -104,8 +105,9 @@ def test_strands_know_where_they_grow(stage):
     np.testing.assert_allclose(mesh.uv_maps["other"], 2.0 * places[strand])
 
 
-def test_fibres_on_a_mesh_are_told(stage):
-    """On strands they are fibres, and nothing is said."""
+def test_fibres_on_a_mesh_lie_along_first_edges(stage):
+    """All triangles have corners of their own, with the edge from their first corner to the second; a note is for
+    points, which have no direction."""
     material = stage.material()
     tree = material.node_tree
     node = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
@@ -118,8 +120,21 @@ def test_fibres_on_a_mesh_are_told(stage):
     hair.materials.append(material)
     stage.link("Hair", hair)
     assert not stage.take().notes
-    data = stage.mesh()
+    data = bpy.data.meshes.new("Card")
+    data.from_pydata([(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
     data.materials.append(material)
-    stage.link("Mesh", data)
+    stage.link("Card", data)
+    taken = stage.take()
+    assert not taken.notes
+    card = next(mesh for mesh in taken.meshes.values() if len(mesh.positions) == 4)
+    edges = card.colors[ROUND][card.triangle_corners]
+    np.testing.assert_array_equal(edges[:, :, :3], np.repeat([[(2, 0, 0)], [(2, 1, 0)]], 3, axis=1))
+    assert not edges[:, :, 3].any()
+    points = bpy.data.pointclouds.new("Points")
+    if not hasattr(points, "resize"):
+        return  # before 5.0 points cannot be made
+    points.resize(1)
+    points.materials.append(material)
+    stage.link("Points", points)
     (note,) = stage.take().notes
-    assert note.material == material.name and "strands alone" in note.text
+    assert note.material == material.name and "point cloud" in note.text
