@@ -76,7 +76,8 @@ Reflection surface_reflection(Surface s, float mu)
     if (s.kind == LOBE_TRANSLUCENT) {
       r.through = luminance(s.glossy_weight) / max(luminance(r.diffuse), 1e-30);
     }
-    if (s.kind == LOBE_TOON && s.glossy_tint.z < 0.9) {
+    // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+    for (bool fibre = s.kind == LOBE_TOON && s.glossy_tint.z < 0.9; fibre; fibre = false) {
       float thick = 2.0 * hair_radius(s.glossy_edge);
       r.through = hair_through(s.glossy_ior) * luminance(s.glossy_weight) / max(luminance(r.diffuse), 1e-30);
       r.rough = (thick > 2.0 * HAIR_FLAT) ? -thick : r.rough;
@@ -105,7 +106,7 @@ vec3 reflection_of(Reflection r, vec3 normal, vec3 light, vec3 viewer)
   vec3 sum = r.diffuse / PI;
   float nl = dot(normal, light);
   float nv = dot(normal, viewer);
-  // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+  // A loop, as above.
   for (float rough = min(r.rough, min(nl, nv) * 1e5); rough > 1e-4; rough = 0.0) {
     sum = diffuse_reflection(r.diffuse, 1.0, r.rough, normal, viewer, light) / nl;
   }
