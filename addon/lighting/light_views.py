@@ -38,10 +38,12 @@ from ..scene.materials import SURFACE_IMAGES
 from ..scene.view import STRAIGHT, VIEW
 from ..sources import lights
 from ..surfaces.draw import OPAQUE, STOCHASTIC, draw_view
+from ..surfaces.places import draw_places, told_by_place
 
 WIDEST = 1.4  # tangent of half the angle of one view
 FARTHEST = 4.0  # the same of what light may reach that casters bend
 MOST_GROUPS, MOST_APART = 4, 32
+PLACE_IMAGES = SURFACE_IMAGES[:2]  # of which a place and its normal are all that is asked
 REFRACTED, REFLECTED = 1, 2  # wanted_lobe of the program of one lobe
 
 
@@ -274,11 +276,7 @@ class LightBuffers:
         everything = frozenset(range(len(frame.materials.compiled)))
         bound = {f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, target.colors)}
         target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-        hiding = {"transparent_mode": STOCHASTIC, "glass_bends": 1, "index_shown": -1}
-        draw_view(
-            frame, technique, target, self._block, view.rows, frame.materials.surface_program,
-            everything - materials, hiding,
-        )  # fmt: skip
+        self._places(frame, technique, view, everything - materials, STOCHASTIC)
         for lobe in lobes:
             # Depths stay from lobe to lobe: what is nearest is the same in all.
             images.Target(target.colors).clear()
@@ -320,18 +318,29 @@ class LightBuffers:
     def receivers(
         self, frame: Frame, technique: Technique, view: LightView, casters: frozenset[int]
     ) -> tuple[Block, dict[str, images.Image]]:
-        """Draw all surfaces but `casters` that the view sees first."""
+        """Draw where all surfaces but `casters` lie that the view sees first: images of place and normal."""
         target = self._of(view.side)
         self._viewed(frame, view)
         target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
         everything = frozenset(range(len(frame.materials.compiled)))
-        constants = {"transparent_mode": OPAQUE, "glass_bends": 1, "index_shown": -1}
-        draw_view(
-            frame, technique, target, self._block, view.rows, frame.materials.surface_program, everything - casters,
-            constants,
-        )  # fmt: skip
+        self._places(frame, technique, view, everything - casters, OPAQUE)
         frame.count(technique, "light views")
-        return self._block, {f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, target.colors)}
+        return self._block, {f"surface_{name}": image for name, image in zip(PLACE_IMAGES, target.colors)}
+
+    def _places(
+        self, frame: Frame, technique: Technique, view: LightView, materials: frozenset[int], mode: int
+    ) -> None:
+        """Draw where `materials` lie: their own programs find it only where the triangles do not tell."""
+        plain = told_by_place(frame, materials, mode == STOCHASTIC)
+        if plain:
+            places = images.Target(self._target.colors[: len(PLACE_IMAGES)], self._target.depth)
+            draw_places(frame, technique, places, self._block, view.rows, plain)
+        if materials - plain:
+            constants = {"transparent_mode": mode, "glass_bends": 1, "index_shown": -1}
+            draw_view(
+                frame, technique, self._target, self._block, view.rows, frame.materials.surface_program,
+                materials - plain, constants,
+            )  # fmt: skip
 
     def _of(self, side: int) -> images.Target:
         if self._target is None or self._target.size != (side, side):
