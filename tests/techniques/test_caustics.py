@@ -10,7 +10,7 @@ import pytest
 
 from addon.frame import shares
 from addon.frame.ledger import RAN, SKIPPED
-from addon.lighting import caustic_casters, photon_grids, photons
+from addon.lighting import caustic_casters, light_views, photon_grids, photons
 from addon.lighting.caustic_casters import grown
 from addon.lighting.caustic_maps import CausticMaps
 from addon.lighting.light_views import groups
@@ -408,6 +408,24 @@ def test_twice_the_power_is_twice_the_caustic(stage, technique_name):
     once = irradiance(stage, technique_name, samples=1, size=(32, 32))
     lamp.data.energy = 2.0
     assert irradiance(stage, technique_name, samples=1, size=(32, 32)) == pytest.approx(2 * once, rel=1e-4, abs=1e-6)
+
+
+def test_what_hides_and_what_catches_is_drawn_where_its_own_material_says(stage, monkeypatch):
+    """By one program for all materials, and by each one's own, which a card with alpha has in any case."""
+    stage.floor()
+    ball(stage, glass(stage))
+    see_through = stage.material("ShaderNodeBsdfPrincipled", Alpha=0.5)
+    for place, material in (((0.4, 0, 2), stage.material("ShaderNodeBsdfDiffuse")), ((-0.4, 0, 2), see_through)):
+        bpy.ops.mesh.primitive_plane_add(size=0.4, location=place)
+        bpy.context.object.data.materials.append(material)
+        bpy.context.object.visible_camera = False
+    lamp = stage.light("SUN", angle=0.0)
+    stage.camera_above(3.0)
+    once = irradiance(stage, MAPPING, samples=1, size=(32, 32))
+    monkeypatch.setattr(light_views, "told_by_place", lambda *_: frozenset())
+    lamp.data.energy = 2.0
+    twice = irradiance(stage, MAPPING, samples=1, size=(32, 32))
+    assert once.max() > 0.5 and twice == pytest.approx(2 * once, rel=1e-3, abs=1e-5)
 
 
 def test_glass_casts_a_full_shadow_where_its_light_arrives_as_photons(stage):
