@@ -12,6 +12,9 @@
 | screen | an emissive screen just above a glossy floor |
 | softboxes of the world | two in an image of the world, above a ball and a green glass |
 | layers | coats over rough bases: both are of one surface |
+| gloss below glass | a small lamp shines through a ball onto a floor of roughness .5 |
+| metal below glass | the same onto brushed metal, .3 |
+| stained slab | thick glass of two colours, which its caustic shows |
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ import bpy
 import numpy as np
 
 from .reflection_scenes import MIRROR, TURNED, _area, _ball, _cube, _look, _material, _placed, _plane
-from .shading import even_world, one_shader
+from .shading import even_world, node_of, one_shader
 
 TILES = (0.8, 0.75, 0.7, 1), 16, (0.3, 0.3, 0.35, 1)
 
@@ -162,8 +165,43 @@ def softboxes_of_the_world() -> None:
     _look((0, -3.4, 1.6), (0, 0, 0.4), 45)
 
 
+def _below_glass(floor) -> None:
+    even_world((0.05, 0.05, 0.05))
+    _plane(floor, (0, 0, 0), scale=(4, 4, 1))
+    _ball(_glass(), (0, 0, 0.55), 0.45)
+    _area((0.8, 1.2, 2.5), 80, 0.6, (0, 0, 0))
+    _look((0, -3.2, 1.5), (0, 0, 0.2), 50)
+
+
+def gloss_below_glass() -> None:
+    _below_glass(_material("Floor", (0.3, 0.3, 0.3, 1), Roughness=0.5))
+
+
+def metal_below_glass() -> None:
+    _below_glass(_material("Floor", (0.7, 0.7, 0.7, 1), Metallic=1.0, Roughness=0.3))
+
+
+def stained_slab() -> None:
+    _table(0.1)
+    stained = _glass("Stained")
+    nodes, links = stained.node_tree.nodes, stained.node_tree.links
+    place, shift, cells = (
+        nodes.new(f"ShaderNode{one}") for one in ("TexCoord", "Mapping", "TexChecker")
+    )  # fmt: skip
+    shift.inputs["Location"].default_value = (0.013, 0.017, 0.06)  # no face lies between two cells
+    cells.inputs["Scale"].default_value = 4.0
+    cells.inputs["Color1"].default_value, cells.inputs["Color2"].default_value = (0.9, 0.15, 0.1, 1), (0.1, 0.3, 0.9, 1)
+    links.new(place.outputs["Object"], shift.inputs["Vector"])
+    links.new(shift.outputs["Vector"], cells.inputs["Vector"])
+    links.new(cells.outputs["Color"], node_of(stained, "BSDF_GLASS").inputs["Color"])
+    _cube(stained, (0, 0, 0.6), 1.0).scale = (1.0, 1.0, 0.06)
+    _area((0, 0, 3), 80, 0.5, (0, 0, 0))
+    _look((0, -3.2, 1.8), (0, 0, 0.2), 50)
+
+
 SCENES = {
     "softbox": softbox, "softboxes of the world": softboxes_of_the_world,
     "tumbler": tumbler, "bottle": bottle, "ice": ice, "perfume": perfume,
     "facing mirrors": facing_mirrors, "puddle": puddle, "screen": screen, "layers": layers,
+    "gloss below glass": gloss_below_glass, "metal below glass": metal_below_glass, "stained slab": stained_slab,
 }  # fmt: skip
