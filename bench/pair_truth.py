@@ -2,13 +2,14 @@
 
 A sun of a degree that a glass ball mirrors onto a wall is met by about one in a million of Cycles' paths: its pictures
 lack that light, and two of them agree about it. Photons that leave the sun and are joined to the camera at each diffuse
-surface have no such gap. What the camera sees through glass, they cannot reach: those blocks are left out.
+surface have no such gap. What the camera sees in glass or a mirror they cannot reach: those blocks are left out.
 
 `--truth PYTHON` names an interpreter that has the packages of the dependency group `truth`; it runs this file as a
 program: `pair_truth.py SCENE.npz RESULT.npz PHOTONS`. Results are kept in results/pairs_truth.npz.
 
-SCENE.npz: arrays `vertices_K`, `normals_K`, `faces_K` for mesh K; by mesh `glass`, `smooth` and `colors` (R, G, B,
-IOR); of the sun `sun` (4, 4), `irradiance` and `spread` (radians); `camera` (4, 4), `angle` across the picture, `size`.
+SCENE.npz: arrays `vertices_K`, `normals_K`, `faces_K` for mesh K; by mesh `glass`, `mirror`, `smooth` and `colors`
+(R, G, B, IOR); of the sun `sun` (4, 4), `irradiance` and `spread` (radians); `camera` (4, 4), `angle` across the
+picture, `size`.
 """
 
 from __future__ import annotations
@@ -50,8 +51,9 @@ def of_room(room, size: tuple[int, int]) -> dict[str, np.ndarray]:
     graph = bpy.context.evaluated_depsgraph_get()
     meshes = [one for one in room.scene.objects if one.type == "MESH"]
     shaders = [next(n for n in one.active_material.node_tree.nodes if n.type.startswith("BSDF")) for one in meshes]
-    if unknown := {one.type for one in shaders} - {"BSDF_DIFFUSE", "BSDF_GLASS"}:
-        raise ValueError(f"Only Diffuse and Glass BSDF are traced, not {', '.join(sorted(unknown))}.")
+    mirrors = np.array([one.type == "BSDF_PRINCIPLED" and _smooth_metal(one) for one in shaders])
+    if unknown := {one.type for one, mirror in zip(shaders, mirrors) if not mirror} - {"BSDF_DIFFUSE", "BSDF_GLASS"}:
+        raise ValueError(f"Diffuse and Glass BSDF and smooth metal are traced, not {', '.join(sorted(unknown))}.")
     data: dict[str, np.ndarray] = {}
     for number, one in enumerate(meshes):
         mesh, matrix = one.evaluated_get(graph).to_mesh(), np.array(one.matrix_world)
@@ -61,15 +63,20 @@ def of_room(room, size: tuple[int, int]) -> dict[str, np.ndarray]:
         data[f"normals_{number}"] = np.array([vertex.normal for vertex in mesh.vertices]) @ matrix[:3, :3].T
         data[f"faces_{number}"] = np.array([triangle.vertices for triangle in mesh.loop_triangles])
     index = [float(one.inputs["IOR"].default_value) if one.type == "BSDF_GLASS" else 1.0 for one in shaders]
-    colors = [[*one.inputs["Color"].default_value[:3], ior] for one, ior in zip(shaders, index)]
+    tint = [one.inputs["Base Color" if mirror else "Color"] for one, mirror in zip(shaders, mirrors)]
+    colors = [[*socket.default_value[:3], ior] for socket, ior in zip(tint, index)]
     camera, lamp = room.camera, room.lamp
     return data | {
-        "glass": np.array([one.type == "BSDF_GLASS" for one in shaders]), "colors": np.array(colors),
+        "glass": np.array([one.type == "BSDF_GLASS" for one in shaders]), "mirror": mirrors, "colors": np.array(colors),
         "smooth": np.array([bool(len(one.data.polygons) and one.data.polygons[0].use_smooth) for one in meshes]),
         "sun": np.array(lamp.matrix_world), "irradiance": np.array(lamp.data.energy * np.array(lamp.data.color)),
         "spread": np.array(lamp.data.angle), "camera": np.array(camera.matrix_world),
         "angle": np.array(camera.data.angle), "size": np.array(size),
     }  # fmt: skip
+
+
+def _smooth_metal(shader) -> bool:
+    return shader.inputs["Metallic"].default_value == 1.0 and shader.inputs["Roughness"].default_value == 0.0
 
 
 def trace(scene_file: str, result_file: str, photons: int) -> None:
@@ -79,8 +86,8 @@ def trace(scene_file: str, result_file: str, photons: int) -> None:
     data = np.load(scene_file)
     width, height = (int(extent) for extent in data["size"])
     parts: dict[str, object] = {"type": "scene", "camera": _camera(mi, data, width, height)}
-    for number, (glass, smooth, color) in enumerate(zip(data["glass"], data["smooth"], data["colors"])):
-        parts[f"mesh{number}"] = _mesh(mi, data, number, bool(glass), bool(smooth), [float(c) for c in color])
+    for number, (smooth, color) in enumerate(zip(data["smooth"], data["colors"])):
+        parts[f"mesh{number}"] = _mesh(mi, data, number, bool(smooth), [float(c) for c in color])
     for number, direction in enumerate(_disc(data["sun"], float(data["spread"]) / 2)):
         shares = [float(one) / DIRECTIONS for one in data["irradiance"]]
         parts[f"sun{number}"] = {
@@ -104,12 +111,15 @@ def _camera(mi, data, width: int, height: int) -> dict:
     return {"type": "perspective", "fov": angle, "fov_axis": "x", "to_world": turned, "film": film}
 
 
-def _mesh(mi, data, number: int, glass: bool, smooth: bool, color: list[float]):
+def _mesh(mi, data, number: int, smooth: bool, color: list[float]):
     matte = {"type": "twosided", "side": {"type": "diffuse", "reflectance": {"type": "rgb", "value": color[:3]}}}
     clear = {"type": "dielectric", "int_ior": color[3], "ext_ior": 1.0}
+    metal = {"type": "conductor", "material": "none", "specular_reflectance": {"type": "rgb", "value": color[:3]}}
     vertices, faces = data[f"vertices_{number}"], data[f"faces_{number}"]
     properties = mi.Properties()
-    properties["mesh_bsdf"] = mi.load_dict(clear if glass else matte)
+    properties["mesh_bsdf"] = mi.load_dict(
+        clear if data["glass"][number] else metal if data["mirror"][number] else matte
+    )
     mesh = mi.Mesh(f"mesh{number}", len(vertices), len(faces), has_vertex_normals=smooth, props=properties)
     values = mi.traverse(mesh)
     values["vertex_positions"] = vertices.astype(np.float32).ravel()

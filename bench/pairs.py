@@ -195,8 +195,8 @@ def beside_truth(own: np.ndarray, truth, names: str, samples: int, doubt: int) -
     pixels, half = truth.images["combined"][..., :3], truth.half["combined"][..., :3]
     traced = pair_truth.known().get(names)
     if traced is not None and own.shape == pixels.shape:
-        glass = truth.images["transmission_color"][..., :3]
-        own, pixels, half = (_clear(one, glass) for one in (own, traced.mean(axis=0), (traced[0] - traced[1]) / 2))
+        shown = sum(truth.images[f"{name}_color"][..., :3] for name in ("transmission", "glossy"))
+        own, pixels, half = (_clear(one, shown) for one in (own, traced.mean(axis=0), (traced[0] - traced[1]) / 2))
     return judged(own, pixels, half, samples, doubt)
 
 
@@ -238,11 +238,11 @@ def judged(own: np.ndarray, truth: np.ndarray, half: np.ndarray, samples: int, d
     }  # fmt: skip
 
 
-def _clear(image: np.ndarray, glass: np.ndarray) -> np.ndarray:
-    """The blocks of a picture that show no glass, side by side: (BLOCK, BLOCK N, 3)."""
+def _clear(image: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """The blocks of a picture that show no glass or gloss, side by side: (BLOCK, BLOCK N, 3)."""
     rows, columns = (extent // BLOCK for extent in image.shape[:2])
     parts = image[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK, 3).swapaxes(1, 2)
-    return np.concatenate(parts[~_blocks(glass).any(axis=-1)], axis=1)
+    return np.concatenate(parts[~_blocks(shown).any(axis=-1)], axis=1)
 
 
 def _of_blocks(difference: np.ndarray, truth: np.ndarray) -> float:
