@@ -8,9 +8,9 @@ first one fails. What is printed:
 - stale ones: the text is not there any more (or not once), so that the entry says nothing until it is mended;
 - equivalents: entries with a `reason` why nothing can be noticed; they are listed and not run.
 
-Before anything is changed the tests must pass on the copy: a test that always fails notices nothing. That run is made
-once per set of tests and kept for the time of the command. Results go to out/mutations.json, as far as they came.
-`--drawn N` takes wrongs that are drawn at random instead of the list, and tells the share that is noticed by room.
+The test that fails must pass without the wrong, where it is run alone: one that always fails notices nothing. Results
+go to out/mutations.json, as far as they came. `--drawn N` takes wrongs drawn at random instead of the list, and tells
+the share that is noticed by room.
 """
 
 from __future__ import annotations
@@ -115,10 +115,6 @@ def judge(mutation: Mutation, folder: Path, sound: dict[tuple[str, ...], str]) -
         return EQUIVALENT, mutation.reason
     if is_stale(mutation, folder):
         return STALE, f"its text does not stand once in {mutation.file}"
-    if mutation.tests not in sound:
-        sound[mutation.tests] = failing(folder, mutation.tests)
-    if sound[mutation.tests]:
-        return BROKEN, sound[mutation.tests]
     path = folder / mutation.file
     right = path.read_text("utf-8")
     path.write_text(mutation.applied(right), encoding="utf-8")
@@ -126,7 +122,12 @@ def judge(mutation: Mutation, folder: Path, sound: dict[tuple[str, ...], str]) -
         by = failing(folder, mutation.tests)
     finally:
         path.write_text(right, encoding="utf-8")
-    return (KILLED, by) if by else (SURVIVED, "")
+    if not by:
+        return SURVIVED, ""
+    alone = (by.split()[1],) if by.startswith(("FAILED", "ERROR")) and "::" in by else mutation.tests
+    if alone not in sound:
+        sound[alone] = failing(folder, alone)
+    return (BROKEN, sound[alone]) if sound[alone] else (KILLED, by)
 
 
 # ------------------------------------------------------------------------------------------------------------- command
