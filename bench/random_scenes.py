@@ -79,13 +79,15 @@ class Draws:
         return (self.draw.random(), self.draw.random(), self.draw.random(), 1.0)
 
 
-def build(number: int) -> tuple[bpy.types.Scene, str]:
-    """Scene `number` in an empty file, and what it holds."""
+def build(number: int, alike: int = 1) -> tuple[bpy.types.Scene, str]:
+    """Scene `number` in an empty file, and what it holds. `alike` scenes in a row share their materials, whose programs
+    are then compiled once for all of them."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene, draws = bpy.context.scene, Draws(number)
     unit = draws.draw.choice(UNITS)
     draws.notes.append(f"{unit:g} m")
-    materials = [_material(draws) for _ in range(4)]
+    painted = draws if alike == 1 else Draws(number // alike, draws.notes)
+    materials = [_material(painted) for _ in range(4)]
     bpy.ops.mesh.primitive_plane_add(size=12 * unit)
     bpy.context.object.data.materials.append(materials[0])
     for _ in range(draws.draw.randint(2, 6)):
@@ -298,17 +300,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all-light", action="store_true", help="with bounces")
     parser.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relMSE that is off (default 0.01)")
     parser.add_argument("--alone", type=float, metavar="SECONDS", help="as many as fit, by Candela alone, with bounces")
+    parser.add_argument(
+        "--alike", type=int, default=1, metavar="N", help="of those, N in a row share their materials (default 1)"
+    )
     parser.add_argument("--save", metavar="FILE.blend", help="write the first scene to a file and render nothing")
 
 
-def alone(first: int, seconds: float, size: tuple[int, int], samples: int, every: int = 25) -> int:
+def alone(first: int, seconds: float, size: tuple[int, int], samples: int, every: int = 25, alike: int = 1) -> int:
     """Render scenes from number `first` on for `seconds`; 1 if one of them failed or had pixels that are not finite."""
     from addon.compare.reference import render_passes
     from addon.frame import ledger
 
     wrong, held, number, until = [], [], first, time.monotonic() + seconds
     while time.monotonic() < until:
-        scene, notes = build(number)
+        scene, notes = build(number, alike)
         try:
             render_passes(scene, "CANDELA", 1 + number % samples, number, size=size)
             bad = ledger.latest().bad_pixels
@@ -350,7 +355,7 @@ def command(options: argparse.Namespace) -> int:
         print(notes)
         return 0
     if options.alone:
-        return alone(options.first, options.alone, options.size, min(options.samples, 4))
+        return alone(options.first, options.alone, options.size, min(options.samples, 4), alike=options.alike)
     off = 0
     for number in range(options.first, options.first + options.count):
         scene, notes = build(number)

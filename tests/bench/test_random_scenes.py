@@ -17,6 +17,26 @@ def test_a_number_makes_one_scene():
     assert random_scenes.build(4)[1] != notes
 
 
+def test_scenes_in_a_row_may_share_their_materials():
+    """So that ten thousand of them do not compile for a day."""
+
+    def described(number):
+        scene, _ = random_scenes.build(number, alike=8)
+        bases = [
+            [
+                tuple(node.inputs["Base Color"].default_value)
+                for node in one.node_tree.nodes
+                if node.type == "BSDF_PRINCIPLED"
+            ]
+            for one in scene.objects[0].data.materials
+        ]
+        return bases, [tuple(one.location) for one in scene.objects]
+
+    (first, places), (second, others), (third, _) = (described(number) for number in (8, 15, 16))
+    assert first == second != third
+    assert places != others
+
+
 @pytest.mark.parametrize("number", range(0, 40, 4))
 def test_every_scene_holds_what_is_rendered(number):
     scene, notes = random_scenes.build(number)
