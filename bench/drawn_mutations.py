@@ -1,8 +1,9 @@
 """Small wrongs drawn at random, for `python -m bench mutations --drawn N`: where tests are blind, nobody thought of it.
 
 From each file of `addon/` and `shaders/` that computes something, places are drawn by a seed: a constant times 1.05, a
-sum in place of a difference, a quotient in place of a product, a comparison the other way, an index off by one. The
-tests are the fast ones nearest to the file: of its own name, or of the modules that use it.
+sum in place of a difference, a quotient in place of a product, a comparison the other way, an index off by one. Guards
+against division by nothing and thresholds are left alone: there a twentieth more is no wrong. The tests are the fast
+ones nearest to the file.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from bench.cells import ROOT
 
-MOST_TESTS = 4  # files of tests for one wrong
+MOST_TESTS = 8  # files of tests for one wrong
 FAST = ("-m", "not slow and not timing and not window")
 COMPUTES = ("eye", "film", "frame", "gfx", "grass", "kernels", "lighting", "materials", "sampling", "scene", "snapshot",
             "sources", "surfaces", "techniques")  # fmt: skip
@@ -35,10 +36,20 @@ def drawn(count: int, seed: int, only: list[str] | None = None) -> list[tuple[st
         places = places_of(file)
         if places and tests_for(file):
             offset, old = chance.choice(places)
+            if _is_a_choice((ROOT / file).read_text(encoding="utf-8"), offset, old):
+                continue
             new, kind = changed(old)
             if all((file, offset) != one[:2] for one in found):
                 found.append((file, offset, old, new, kind))
     return found
+
+
+def _is_a_choice(text: str, offset: int, old: str) -> bool:
+    """Is a constant a guard against division by nothing, or a threshold? A twentieth more is no wrong there."""
+    number = "." in old or "e" in old
+    return number and (
+        0 < float(old) <= 1e-3 or text[:offset].rstrip()[-1:] in "<>" or text[:offset].endswith(("<= ", ">= "))
+    )
 
 
 def sources() -> list[str]:
@@ -89,14 +100,28 @@ def _shader_places(text: str):
 
 @cache
 def tests_for(file: str) -> tuple[str, ...]:
-    """Arguments for pytest: the files of tests nearest to a file, and that they be fast. Empty where there are none."""
+    """Arguments for pytest: the files of tests nearest to a file, and that they be fast. Empty where there are none.
+    First those that are named after its modules, then those that import them (where there are neither, those of the
+    modules that use it), then those that speak of it, then those that are named after its room."""
     modules = [Path(file).stem] if file.endswith(".py") else _users(file)
-    named = [path for module in modules for path in (ROOT / "tests").rglob(f"test_{module}*.py")]
-    if not named:
-        users = [module for one in modules for module in _importers(one)]
-        named = [path for module in users for path in (ROOT / "tests").rglob(f"test_{module}.py")]
-    names = list(dict.fromkeys(str(path.relative_to(ROOT)) for path in named if "window" not in path.parts))
-    return (*names[:MOST_TESTS], *FAST) if names else ()
+    names = _tests_of(modules) or _tests_of([module for one in modules for module in _importers(one)])
+    word = Path(file).name.split(".")[0]
+    speaking = [f"tests/{name}" for name, text in _texts("tests", "test_*.py", whole=True) if word in text.lower()]
+    names = dict.fromkeys((*names, *(speaking if len(word) > 4 else ()), *_tests_named(Path(file).parts[1])))
+    return (*list(names)[:MOST_TESTS], *FAST) if names else ()
+
+
+def _tests_of(modules: list[str]) -> list[str]:
+    """Files of tests that are named after modules, or that import them, in this order."""
+    wanted = [re.compile(rf"^ *from addon\S*( import .*\b|\.){one}\b", re.MULTILINE) for one in modules]
+    importing = [name for pattern in wanted for name, text in _texts("tests", "test_*.py", whole=True)
+                 if pattern.search(text)]  # fmt: skip
+    return [*(name for one in modules for name in _tests_named(one)), *(f"tests/{name}" for name in importing)]
+
+
+def _tests_named(word: str) -> list[str]:
+    found = [f"tests/{name}" for name, _ in _texts("tests", "test_*.py", whole=True) if f"test_{word}" in name]
+    return [name for name in found if not name.startswith("tests/window")]
 
 
 @cache
