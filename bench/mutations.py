@@ -106,6 +106,9 @@ def failing(folder: Path, tests: tuple[str, ...]) -> str:
     if done.returncode == 0:
         return ""
     lines = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    if "Fatal Python error" in done.stderr:  # where it was: the first lines of what the handler of faults prints
+        fault = done.stderr[done.stderr.index("Fatal Python error") :].splitlines()
+        lines.append("; ".join(line.strip() for line in fault if line.startswith(("Fatal", "  File")))[:400])
     return lines[0] if lines else (done.stdout + done.stderr).strip().splitlines()[-1]
 
 
