@@ -1,5 +1,7 @@
 """Functions of shaders by themselves, against closed forms."""
 
+import colorsys
+
 import numpy as np
 import pytest
 
@@ -102,3 +104,18 @@ def test_a_thin_film_reflects_what_airys_formula_says(gpu_context, thickness, fi
     apart = np.abs(found[1:, :3] - total @ colors)
     print(f"mean {apart.mean():.5f}, most {apart.max():.5f}")
     assert apart.mean() < 2e-3 and apart.max() < 0.02
+
+
+@pytest.mark.parametrize("model", ["hsv", "hsl"])
+def test_colours_go_to_models_of_hue_and_back(gpu_context, model):
+    """By Python's colorsys, over colours in which each channel is the largest, and the least."""
+    color = "(vec3(0.5) + 0.45 * cos(vec3(0.0, 2.1, 4.2) + 13.0 * k))"
+    there = evaluated("material/color_models.glsl", f"vec4(rgb_to_{model}({color}), k)")
+    back = evaluated("material/color_models.glsl", f"vec4({model}_to_rgb(rgb_to_{model}({color})), k)")
+    rgb = 0.5 + 0.45 * np.cos(np.array([0.0, 2.1, 4.2]) + 13.0 * there[:, 3:])
+    if model == "hsv":
+        expected = [colorsys.rgb_to_hsv(*one) for one in rgb]
+    else:
+        expected = [np.array(colorsys.rgb_to_hls(*one))[[0, 2, 1]] for one in rgb]
+    np.testing.assert_allclose(there[:, :3], expected, atol=1e-4)
+    np.testing.assert_allclose(back[:, :3], rgb, atol=1e-5)
