@@ -94,12 +94,11 @@ def test_a_card_is_a_fibre_along_its_first_edge(stage, turn, sun):
 
 
 def test_strands_light_each_other_through_themselves(stage):
-    """Red of Cycles' ribbons, 128 samples; as diffuse surfaces of one side they had 1.33 times that."""
+    """Red of Cycles' ribbons, 512 samples; of it .1061 comes from the lamp straight."""
     rows = [[(-1 + 0.05 * k, 0.3 * (-1) ** k, z) for z in np.linspace(0, 1, 4)] for k in range(41)]
     fibre(stage, rows, 0.03, Melanin=0.25)
     stage.camera((0, -5, 0.5), (np.pi / 2, 0, 0))
     stage.scene.camera.data.type, stage.scene.camera.data.ortho_scale = "ORTHO", 2.0
     stage.light("AREA", (1, -4, 1.5), (np.pi / 2 - 0.24, 0, 0.24), energy=150.0, size=0.5)
-    stage.scene.candela.bounces = 2
-    red = stage.render(8, (48, 36))["combined"][12:24, 8:40, 0]
-    np.testing.assert_allclose(red.mean(), 0.1053, rtol=0.1)
+    red = stage.render(8, (48, 36), bounces=2)["combined"][12:24, 8:40, 0]
+    np.testing.assert_allclose(red.mean(), 0.1357, rtol=0.03)
