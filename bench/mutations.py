@@ -112,6 +112,11 @@ def failing(folder: Path, tests: tuple[str, ...]) -> str:
     return lines[0] if lines else (done.stdout + done.stderr).strip().splitlines()[-1]
 
 
+def named(line: str) -> str:
+    """The test that a line of pytest's summary names: "FAILED file::test[of spaces, too] - why"."""
+    return line.split(" ", 1)[1].split(" - ")[0]
+
+
 def judge(mutation: Mutation, folder: Path, sound: dict[tuple[str, ...], str]) -> tuple[str, str]:
     """What becomes of a mutation, and by which test or why."""
     if mutation.reason:
@@ -127,7 +132,7 @@ def judge(mutation: Mutation, folder: Path, sound: dict[tuple[str, ...], str]) -
         path.write_text(right, encoding="utf-8")
     if not by:
         return SURVIVED, ""
-    alone = (by.split()[1],) if by.startswith(("FAILED", "ERROR")) and "::" in by else mutation.tests
+    alone = (named(by),) if by.startswith(("FAILED", "ERROR")) and "::" in by else mutation.tests
     if alone not in sound:
         sound[alone] = failing(folder, alone)
     return (BROKEN, sound[alone]) if sound[alone] else (KILLED, by)

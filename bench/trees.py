@@ -1,4 +1,4 @@
-"""The trees that rays search: `python -m bench trees`, which takes about two minutes and writes docs/trees.md.
+"""The trees that rays search: `python -m bench trees --page`, about two minutes, writes docs/trees.md.
 
 Rays: those of a camera and as many that leave a surface in any direction, through the same triangles in one tree and
 with trees of meshes' own. Moves: one of 2,000 objects of 500 triangles each moves in a viewport's draft, and the view
@@ -340,7 +340,12 @@ PARTS = {"rays": rays, "moves": moves, "copies": copies}
 STUDY = Study(
     "trees",
     {name: lambda options, part=part: part(0.1 if options.small else 1.0) for name, part in PARTS.items()},
-    {"--small": {"action": "store_true", "help": "a tenth of everything"}},
-    flag="--part",
+    {"--small": {"action": "store_true", "help": "a tenth of everything, of which nothing is written"}},
+    flag="--page --part",
 )
-add_options, command = STUDY.add_options, STUDY.command
+add_options = STUDY.add_options
+
+
+def command(options) -> int:
+    options.page = options.page and not options.small
+    return STUDY.command(options)

@@ -42,6 +42,11 @@ def test_what_becomes_of_a_wrong(tree, mutation, state):
     assert (tree / "source.py").read_text() == SOURCE
 
 
+def test_names_of_tests_may_have_spaces():
+    assert mutations.named("FAILED tests/a.py::test_it[two words] - assert 1 == 2") == "tests/a.py::test_it[two words]"
+    assert mutations.named("ERROR tests/a.py") == "tests/a.py"
+
+
 def test_forty_wrongs_stand_in_the_list_and_in_the_code():
     """Those whose text has changed are named by the command; enough of them must apply for it to say something."""
     found = mutations.read()

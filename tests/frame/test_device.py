@@ -81,15 +81,20 @@ def test_pixels_are_drawn_or_computed_alike_as_the_device_says(room, monkeypatch
         np.testing.assert_allclose(found["computed"][name], image, rtol=1e-5, atol=1e-6, err_msg=name)
 
 
-def test_computed_pixels_are_those_of_some_rows(gpu_context):
-    for figure in (SOFTWARE.fragment, 0.1 * SOFTWARE.fragment):
-        device.use(replace(SOFTWARE, compute=figure))
+@pytest.mark.parametrize("share", [1.0, 0.1])
+def test_computed_pixels_are_those_of_some_rows(gpu_context, monkeypatch, share):
+    dispatched, own = [], passes.compute
+    monkeypatch.setattr(passes, "compute", lambda *given, **named: (dispatched.append(1), own(*given, **named)))
+    device.use(replace(SOFTWARE, compute=share * SOFTWARE.fragment))
+    try:
         with images.borrowed(9, 7, "RGBA32F") as target:
             target.clear()
             passes.each_pixel(device_probe.STEP, target, rows=(2, 5))
             drawn = images.read(target.colors[0])[..., 3]
-        np.testing.assert_array_equal(drawn.sum(axis=1), [0, 0, 9, 9, 9, 0, 0])
-    device.use(None)
+    finally:
+        device.use(None)
+    assert bool(dispatched) == (share < 0.5)
+    np.testing.assert_array_equal(drawn.sum(axis=1), [0, 0, 9, 9, 9, 0, 0])
 
 
 def test_the_plan_foresees_the_same_choice(room):
