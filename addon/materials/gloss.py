@@ -12,6 +12,7 @@ from .working_space import current
 SMOOTH = 0.25  # roughness up to which metal throws caustics; above it gloss takes them (shaders/caustics/gloss.glsl)
 METALLIC = 0.5  # from which on a Principled BSDF mirrors
 DARK = 0.1  # luminance of a base of which the polish above it throws more light
+_GLASS = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 _MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
 
 
@@ -20,6 +21,15 @@ def mirrors(graph: Graph) -> Iterator[float]:
     for node in graph.nodes.values():
         metal = node.type == "ShaderNodeBsdfPrincipled" and value(node, "Metallic") >= METALLIC
         if metal or node.type in _MIRRORS:
+            yield value(node, "Roughness", 1.0)
+
+
+def glass(graph: Graph) -> Iterator[float]:
+    """Roughness of each lobe of glass; 1 where a texture says it."""
+    for node in graph.nodes.values():
+        if node.type in _GLASS or (
+            node.type == "ShaderNodeBsdfPrincipled" and value(node, "Transmission Weight", 1.0) > 0.0
+        ):
             yield value(node, "Roughness", 1.0)
 
 
@@ -37,7 +47,7 @@ def patterned(graph: Graph) -> bool:
     sockets = [
         node.inputs.get("Base Color" if node.type == "ShaderNodeBsdfPrincipled" else "Color")
         for node in graph.nodes.values()
-        if node.type in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction", "ShaderNodeBsdfPrincipled")
+        if node.type in (*_GLASS, "ShaderNodeBsdfPrincipled")
     ]
     return any(socket is not None and socket.link is not None for socket in sockets)
 

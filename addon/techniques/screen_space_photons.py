@@ -160,7 +160,7 @@ class ScreenSpacePhotons(Technique):
         # Rays of gloss leave out what photons bring it: of lamps whose light they take glass as opaque for.
         key, rayed = caustic_casters.key_of(light.emitter), frame.service(ShadedLobes) is not None
         known = not rayed or key == caustic_casters.WORLD or key in frame.kept(CausticMaps).lights
-        onto_gloss = on_gloss and known and key != caustic_casters.MESHES
+        onto_gloss = on_gloss and known and key != caustic_casters.MESHES and _seen_through_glass(frame, light)
         interfaces = frame.settings.get(self, "interfaces")
         for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, onto_gloss):
             records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
@@ -182,8 +182,16 @@ class ScreenSpacePhotons(Technique):
 
 
 def _on_gloss(snapshot: Snapshot, casters: caustic_casters.Casters | str) -> bool:
-    """Whether glossy lobes may take photons. None end on mirrors, even where those have a rough lobe, too."""
+    """Whether glossy lobes may take photons. None end on mirrors or glass, even where those have a rough lobe, too."""
     if isinstance(casters, str) or not casters.refracting or not snapshot.film.caustics_refractive:
         return False
-    smooth = (max(gloss.mirrors(snapshot.materials[k].graph)) <= gloss.SMOOTH for k in casters.mirrors)
-    return may_be_glossy(snapshot) and all(smooth)
+    rough = [*(max(gloss.mirrors(snapshot.materials[k].graph)) for k in casters.mirrors)]
+    rough += [max(gloss.glass(snapshot.materials[k].graph), default=1.0) for k in casters.refracting]
+    return may_be_glossy(snapshot) and max(rough) <= gloss.SMOOTH
+
+
+def _seen_through_glass(frame: Frame, light: LitView) -> bool:
+    """Whether rays of gloss that glass lets pass would find the light."""
+    if light.emitter.light is None:
+        return frame.snapshot.world.visibility.transmission
+    return light.emitter.light.visibility.transmission

@@ -42,6 +42,9 @@ void main()
   Surface s = SURFACE_READ(pixel);
   bool both = surface_goes_both_ways(s);
 #ifndef ONWARD
+  bool takes_photons = photons_shine != 0 && gloss_takes_photons(s);  // none end on glass, whichever way it goes
+#endif
+#ifndef ONWARD
   if (way != 0) {  // of glass that goes both ways; the other way all lobes go
     if (!both) {
       return;
@@ -58,7 +61,8 @@ void main()
   bool clear = path_is_clear(code);
   int mirrored = path_mirrors(code);
   bool edited = path_is_edited(code) || (edits_what_leaves(s) && s.glossy_ior > 1.0);
-  code = (code & 3) + PATH_MIRROR * mirrored + ((path_has_photons(code) && (s.kind == LOBE_REFRACTION || mirrors_within(s))) ? PATH_PHOTONS : 0);
+  bool has_photons = path_has_photons(code);
+  code = (code & 3) + PATH_MIRROR * mirrored;
   bool through = path_goes_through(before.w);
   if (code == 0 && !through) {
     return;
@@ -102,6 +106,8 @@ void main()
     s = found_by_rays ? mirror : s;
   }
   through = through && apart;
+  // Photons that glass mirrors from outside do not shine on gloss (caustics/photon.frag.glsl).
+  code += (has_photons && (s.kind == LOBE_REFRACTION || mirrors_within(s))) ? PATH_PHOTONS : 0;
 #endif
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
   vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));
@@ -159,7 +165,7 @@ void main()
     code += PATH_MIRROR + (edited ? PATH_EDITED : 0);
 #ifndef ONWARD
     density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
-    code += (photons_shine != 0 && gloss_takes_photons(s)) ? PATH_PHOTONS : 0;
+    code += takes_photons ? PATH_PHOTONS : 0;
 #endif
   }
   throughput *= weight / max(kept, 1e-6);

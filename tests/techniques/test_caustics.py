@@ -805,6 +805,32 @@ def test_gloss_shows_a_lamp_through_glass_that_bends_nothing_as_without_it(stage
     assert through[10:14, 10:14].mean() == pytest.approx(free[10:14, 10:14].mean(), rel=0.06)
 
 
+def test_gloss_does_not_take_photons_of_a_lamp_that_rays_do_not_see_through_glass(stage):
+    gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=0.5, Color=(1, 1, 1, 1))
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
+    ball(stage, glass(stage, 1.0), place=(0, 0, 1.0), segments=48)
+    lamp = stage.light("SPOT", location=(0, 0, 2.5), shadow_soft_size=0.1, spot_size=0.8, spot_blend=0.0)
+    lamp.visible_transmission = False
+    stage.camera_above(1.2)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    found = stage.render(samples=2, size=(24, 24), bounces=3)["combined"][..., 0]
+    assert stage.ledger.row(PHOTONS).state == RAN
+    assert not found[10:14, 10:14].any()
+
+
+def test_rough_glass_mirrors_a_lamp_behind_clear_glass(stage):
+    """No photon ends on glass: its rays look for the lamp themselves, as without the ball."""
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=glass(stage, 1.5, Roughness=0.28))
+    made = ball(stage, glass(stage, 1.0), place=(0, 0, 1.0), segments=48)
+    stage.light("SPOT", location=(0, 0, 2.5), shadow_soft_size=0.3, spot_size=0.8, spot_blend=0.0)
+    stage.camera_above(1.2)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    through = stage.render(samples=8, size=(24, 24), bounces=3)["glossy_indirect"][..., 0]
+    made.hide_render = True
+    free = stage.render(samples=8, size=(24, 24), bounces=3)["glossy_direct"][..., 0]
+    assert through.sum() == pytest.approx(free.sum(), rel=0.1)
+
+
 @pytest.mark.slow
 def test_points_of_a_wide_lamp_share_a_map_that_has_the_light_of_all(stage, monkeypatch):
     kept, keep = [], CausticMaps.keep

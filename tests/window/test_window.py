@@ -80,7 +80,15 @@ def run_script(backend, script, *arguments, _done={}):  # noqa: B006 - a cache: 
         display += ("--enable-event-simulate",) if script in SIMULATED else ()
         path = Path(__file__).with_name(f"{script}.py")
         blender(
-            *display, OWN_FILES.get(script, SAMPLE), "--python", path, "--", *arguments, folder, log=folder / "blender.log", timeout_s=1800
+            *display,
+            OWN_FILES.get(script, SAMPLE),
+            "--python",
+            path,
+            "--",
+            *arguments,
+            folder,
+            log=folder / "blender.log",
+            timeout_s=1800,
         )
         _done[backend, script] = folder, json.loads((folder / "result.json").read_text())
     return _done[backend, script]
