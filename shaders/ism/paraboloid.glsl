@@ -33,7 +33,10 @@ struct TexelRay {
 TexelRay texel_ray(ivec2 texel, int side, float parallel)
 {
   vec2 point = (vec2(texel) + 0.5) * (2.0 / float(side)) - 1.0;
-  return (parallel > 0.0) ? TexelRay(vec3(parallel * point, 0.0), vec3(0.0, 0.0, 1.0)) : TexelRay(vec3(0.0), disc_direction(point));
+  TexelRay ray;
+  ray.start = vec3(max(parallel, 0.0) * point, 0.0);
+  ray.direction = (parallel > 0.0) ? vec3(0.0, 0.0, 1.0) : disc_direction(point);
+  return ray;
 }
 
 // From the frame of a map with this axis to world space; its transpose is its inverse: v * frame goes back.
