@@ -23,7 +23,7 @@ from ..gfx.interface import answered
 from ..materials.compiler import may_emit
 from ..sampling.sequence import uniform
 from ..sources import lights
-from . import linked
+from . import caustic_casters, linked
 from .asked import asked
 from .emissive_triangles import EmissiveTriangles
 from .loop import lighting
@@ -64,17 +64,18 @@ class PointLight:
 
     def add(
         self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target, number: int | None = None,
-        instances: images.Image | None = None, without: frozenset[int] = frozenset(),
+        instances: images.Image | None = None, without: frozenset[int] = frozenset(), photons: bool = False,
     ) -> tuple[int, int]:  # fmt: skip
         """Add this sample's diffuse and glossy direct light, or that of sample `number`, on `surfaces` (by the names of
         SURFACE_IMAGES) to the two images of `target`. `instances`: of which instance each point is (z: its row in the
-        geometry's image), for lights that leave out objects. `without`: ids of lamps that are left out. Returns the
-        numbers of passes and of rays a point."""
+        geometry's image), for lights that leave out objects. `without`: ids of lamps that are left out.
+        `photons`: what glass passes of light that photons answer for arrives with these. Returns the numbers of passes
+        and of rays a point."""
         number = frame.sample if number is None else number
         by_blockers: dict[frozenset[int], list[np.ndarray]] = {}  # that let light pass
-        for passing, row in (*self._lamps(frame, number, without), *self._emitted(frame, number)):
+        for passing, row in (*self._lamps(frame, number, without, photons), *self._emitted(frame, number, photons)):
             by_blockers.setdefault(passing, []).append(row)
-        by_blockers[frozenset()] = by_blockers.get(frozenset(), []) + list(self._world(frame, number))
+        by_blockers[frozenset()] = by_blockers.get(frozenset(), []) + list(self._world(frame, number, photons))
         rows = [row for some in by_blockers.values() for row in some]
         drawn = 0
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
@@ -103,7 +104,7 @@ class PointLight:
         return max(self._few // frame.settings.samples, least) if self._each is None else self._each
 
     def _lamps(
-        self, frame: Frame, sample_number: int, without: frozenset[int] = frozenset()
+        self, frame: Frame, sample_number: int, without: frozenset[int], photons: bool
     ) -> Iterator[tuple[frozenset[int], np.ndarray]]:
         """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power. With each the
         groups of blockers that let its light pass."""
@@ -130,9 +131,12 @@ class PointLight:
                 shadowed = int(emitter.light.cast_shadow)
                 row = emitter.row(sample, 0, shadowed, weight, each, points)
                 row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
+                row[lights.LIGHT.at.flags] += lights.GLASS_BLOCKS_FLAG * (
+                    photons and caustic_casters.answered(frame, emitter)
+                )
                 yield emitter.light.links.passing, row
 
-    def _world(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
+    def _world(self, frame: Frame, sample_number: int, photons: bool) -> Iterator[np.ndarray]:
         world = frame.snapshot.world
         if not frame.environment.power > 0 or not world.visibility.diffuse:
             return
@@ -140,17 +144,20 @@ class PointLight:
         numbers = range(sample_number * each, (sample_number + 1) * each)
         drawn = np.array([frame.random(f"{self._use}/world", number) for number in numbers])
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.EVEN_FLAG * world.even
+        bright = caustic_casters.bright_world(frame) if photons else None
         for direction, radiance, density in zip(*frame.environment.draw(*drawn.T)):
-            yield lights.direction_row(direction, radiance / density, density, flags, 0, 1, each)
+            blocked = lights.GLASS_BLOCKS_FLAG * (bright is not None and bright.holds(radiance))
+            yield lights.direction_row(direction, radiance / density, density, flags + blocked, 0, 1, each)
 
-    def _emitted(self, frame: Frame, sample_number: int) -> Iterator[tuple[frozenset[int], np.ndarray]]:
+    def _emitted(self, frame: Frame, sample_number: int, photons: bool) -> Iterator[tuple[frozenset[int], np.ndarray]]:
         if self._emissive is None:
             return
         each = self._points(frame, self._others)
         for number in range(sample_number * each, (sample_number + 1) * each):
             numbers = frame.random_volume(f"{self._use}/emissive", number)
             samples = self._sharpness * frame.settings.samples
-            row = self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=samples)
+            blocked = lights.GLASS_BLOCKS_FLAG * (photons and caustic_casters.meshes_answered(frame))
+            row = self._emissive.row(numbers, each, lights.SHADOW_FLAG + blocked, samples=samples)
             yield self._emissive.passing_at(numbers[0]), row
 
     def release(self) -> None:

@@ -5,7 +5,9 @@
 Each x_i is a texel of a lamp's view of the objects, with the flux that it stands for, so that no area has to be counted
 (the specification's flux mode). It is drawn as a square that faces the camera, as large as the radius within which 99 %
 of the dipole lies; pixels of the same object add their share. As the thesis' own practice for the world, points of the
-mesh stand for what has no view: the world, emissive meshes, lamps with links or node trees of their own.
+mesh stand for what has no view: the world, emissive meshes, lamps with links; and of all lamps on objects that shadow
+rays do not meet for certain. A channel whose range is less than a pixel or what texels of all samples lie apart leaves
+where it enters.
 
 | cost | per sample |
 |---|---|
@@ -37,12 +39,13 @@ from ..sources import lights
 from ..surfaces.hits import Hits
 from ..surfaces.scatter_means import ScatterMeans
 from .asked import asked
+from .caustic_casters import answered
 from .light_views import groups, views_of
 from .point_light import PointLight
 
 FEW = 4  # points of a wide lamp, in a picture of one sample
 RECORDS = (("VEC4", "out_point"), ("VEC4", "out_flux"))
-OBJECTS = (("RGBA32F", "scatter_objects"), ("RGBA32F", "scatter_means"), ("RGBA32F", "point_entry"))
+OBJECTS = tuple(("RGBA32F", name) for name in ("scatter_objects", "scatter_means", "point_entry", "splat_objects"))
 RAYS = passes.fullscreen_program(
     "subsurface, a lamp's view",
     "subsurface/splat_rays.frag.glsl",
@@ -51,14 +54,18 @@ RAYS = passes.fullscreen_program(
         *OBJECTS,
     ),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(("INT", "first_object"), ("INT", "first_leaf"), ("FLOAT", "offset_size")),
+    constants=(
+        *(("INT", name) for name in ("first_object", "first_leaf", "group_seen", "glass_stops")),
+        ("FLOAT", "offset_size"),
+    ),
     outputs=RECORDS,
 )  # fmt: skip
 POINTS = passes.fullscreen_program(
     "subsurface, points as splats",
     "subsurface/splat_points.frag.glsl",
     textures=(
-        *(("RGBA32F", name) for name in ("point_position", "point_instances", "cells", "cell_direct")), *OBJECTS,
+        *(("RGBA32F", name) for name in ("point_position", "point_instances", "cells", "cell_direct", "cell_whole")),
+        *OBJECTS,
     ),
     constants=(("INT", "first_object"),),
     outputs=RECORDS,
@@ -88,7 +95,9 @@ SPLAT = Program(
 APPLY = passes.fullscreen_program(
     "subsurface, light of splats",
     "subsurface/splat_apply.frag.glsl",
-    textures=(*(("RGBA32F", name) for name in SHOWN), ("RGBA32F", "light_direct"), ("RGBA32F", "splatted")),
+    textures=tuple(
+        ("RGBA32F", name) for name in (*SHOWN, "light_direct", "splatted", "dipole_transport", "splat_objects")
+    ),
     blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_direct"),),
 )
@@ -103,9 +112,12 @@ class Splats:
         self._block: Block | None = None
         self._boxes: list[tuple[np.ndarray, np.ndarray]] = []
         self._lamps: list[lights.Emitter] = []
+        # By object: m between texels of all samples; number of its box, -1: no view of it, its points have all light.
+        self._objects: images.Image | None = None
+        self._unseen = False  # whether there are such
 
-    def begin(self, frame: Frame, points: ScatterPoints, materials: set[int]) -> None:
-        """Find what lamps look at. `materials`: those that scatter."""
+    def begin(self, frame: Frame, points: ScatterPoints, materials: set[int], grid: int) -> None:
+        """Find what lamps look at. `materials`: those that scatter; `grid`: texels along a side of a view."""
         frame.kept(ScatterMeans).update(frame, sorted(materials))
         shown, meshes = [frame.geometry.placed[0][one.instance] for one in points.objects], frame.snapshot.meshes
         low, high = [], []
@@ -116,6 +128,16 @@ class Splats:
             low.append(placed.min(axis=0))
             high.append(placed.max(axis=0))
         self._boxes = list(zip(*groups(np.array(low), np.array(high)))) if shown else []
+        compiled, rows = frame.materials.compiled, []
+        for one, listed, own_low, own_high in zip(shown, points.objects, low, high):
+            box, apart = -1, listed.spacing
+            if one.visibility.shadow and not any(compiled[material].casts_stochastically for material in one.materials):
+                for number, (box_low, box_high) in enumerate(self._boxes):
+                    if (own_low >= box_low).all() and (own_high <= box_high).all():
+                        box, apart = number, (box_high - box_low).max() / grid
+            rows.append((apart / np.sqrt(frame.settings.samples), box, 0.0, 0.0))
+        self._objects = images.upload_list(np.array(rows, np.float32).reshape(-1, 4))
+        self._unseen = any(row[1] < 0 for row in rows)
         self._lamps = [one for one in frame.emitters if self._has_view(one)]
 
     @staticmethod
@@ -144,7 +166,11 @@ class Splats:
         direct = frame.target("radiance.diffuse_direct")
         passes.copy(shown["radiance.diffuse_direct"], images.Target((before,)))
         passes.fullscreen(
-            APPLY, direct, textures={**picture, "light_direct": before, "splatted": sums},
+            APPLY, direct,
+            textures={
+                **picture, "light_direct": before, "splatted": sums, "dipole_transport": dipoles[1],
+                "splat_objects": self._objects,
+            },
             blocks={"film_view": frame.view_block},
         )  # fmt: skip
         for image in (*dipoles, sums, before):
@@ -165,7 +191,7 @@ class Splats:
             return
         objects = {
             "scatter_objects": points.table, "scatter_means": frame.kept(ScatterMeans).image,
-            "point_entry": points.entries(frame.sample),
+            "point_entry": points.entries(frame.sample), "splat_objects": self._objects,
         }  # fmt: skip
         yield from self._views(frame, technique, points, objects)
         yield from self._points(frame, technique, points, light, objects)
@@ -182,14 +208,17 @@ class Splats:
             for number in range(frame.sample * each, (frame.sample + 1) * each):
                 sample = emitter.sample(*frame.random_volume("subsurface/light", number))
                 shift = frame.random("subsurface/grid", number)
-                for low, high in self._boxes:
+                for box, (low, high) in enumerate(self._boxes):
+                    constants = {
+                        "group_seen": box, "glass_stops": int(answered(frame, emitter)), "first_leaf": first_leaf,
+                    }  # fmt: skip
                     for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
                         yield self._seen(frame, points, objects, view, emitter.row(sample, 0, 0, 1.0, each),
-                                         hierarchy, owners, first_leaf)  # fmt: skip
+                                         hierarchy, owners, constants)  # fmt: skip
                         frame.count(technique, "rays", side * side)
 
     def _seen(
-        self, frame: Frame, points: ScatterPoints, objects, view, row, hierarchy, owners, first_leaf
+        self, frame: Frame, points: ScatterPoints, objects, view, row, hierarchy, owners, constants
     ) -> tuple[images.Image, ...]:
         values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
         if self._block is None:
@@ -203,41 +232,45 @@ class Splats:
         passes.fullscreen(
             asked(frame, RAYS, textures), images.Target(made), textures=textures,
             blocks={"film_view": self._block, "sources": self._sources.set([row])},
-            constants={
-                "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
-            },
+            constants={**constants, "first_object": points.first_object, "offset_size": frame.offset_size},
         )  # fmt: skip
         return made
 
     def _points(
         self, frame: Frame, technique: Technique, points: ScatterPoints, light: PointLight, objects
     ) -> Iterator[tuple[images.Image, ...]]:
-        """Of the light that points of the mesh receive from all but the lamps with views."""
+        """Of the light of points of the mesh from all but the lamps with views; of objects that these miss from all."""
         size = (ROW, points.rows)
         position, normal = points.surface(frame.sample)
         lit = [images.pool.take(*size, "RGBA32F") for _ in range(2)]
+        whole = [images.pool.take(*size, "RGBA32F") for _ in range(2)] if self._unseen else []
         black = images.pool.take(*size, "RGBA32F")
-        images.Target((black,)).clear()
-        images.Target(tuple(lit)).clear()
+        for some in ((black,), lit, whole) if whole else ((black,), lit):
+            images.Target(tuple(some)).clear()
         surfaces = {
             "position": position, "normal": normal, "diffuse": objects["point_entry"],
             **dict.fromkeys(("tint", "lobe", "emission"), black),
         }  # fmt: skip
         without = frozenset(id(one) for one in self._lamps)
-        drawn, rays = light.add(frame, surfaces, images.Target(tuple(lit)), None, points.instances, without)
-        if drawn and rays:
+        rays = 0
+        for pair, left_out in ((lit, without), (whole, frozenset())):
+            if pair:
+                target = images.Target(tuple(pair))
+                rays += light.add(frame, surfaces, target, None, points.instances, left_out, photons=True)[1]
+        if rays:
             frame.count(technique, "rays", rays * ROW * points.rows)
             made = tuple(images.pool.take(*size, "RGBA32F") for _ in RECORDS)
             passes.fullscreen(
                 POINTS, images.Target(made),
                 textures={
                     "point_position": position, "point_instances": points.instances, "cell_direct": lit[0],
+                    "cell_whole": (whole or lit)[0],
                     "cells": points.cells[frame.sample % len(points.cells)], **objects,
                 },
                 constants={"first_object": points.first_object},
             )  # fmt: skip
             yield made
-        for image in (*lit, black):
+        for image in (*lit, *whole, black):
             images.pool.give(image)
 
     def release(self) -> None:

@@ -235,7 +235,7 @@ class ImageSpaceSubsurface(Technique):
         self._whole[0].clear()
         self._light.begin(frame)
         if self._splatted(frame.settings, frame.snapshot):
-            self._splats.begin(frame, self.points, self._materials)
+            self._splats.begin(frame, self.points, self._materials, frame.settings.get(self, "grid"))
         elif frame.settings.get(self, "form") == SPLATS:
             frame.account.chose(self, "form", f"{PROFILES}, because {bends_lines(frame.snapshot)}")
         self._leaving_sample, self._direct = -1, None

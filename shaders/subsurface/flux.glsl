@@ -3,7 +3,7 @@
 //   point  xyz; w: the object's number from 1 on, and as a fraction half of how translucent the surface is there; 0: none
 //   flux   rgb, W, what enters there; w: radius within which it leaves, m
 //
-// A program that includes this binds `scatter_means` and `scatter_objects` and writes out_point and out_flux.
+// A program that includes this binds `scatter_means`, `scatter_objects` and `splat_objects` and writes out_point and out_flux.
 #include "lib/closure.glsl"
 #include "subsurface/image.glsl"
 #include "subsurface/dipole.glsl"
@@ -11,6 +11,12 @@
 vec4 object_texel(int index)
 {
   return scatter_objects_fetch(ivec2(index & 2047, index >> 11));
+}
+
+// Number of the box of objects that lamps see this one in; below 0: none, all its light is that of points.
+float box_of(int object)
+{
+  return splat_objects_fetch(ivec2((object - 1) & 2047, (object - 1) >> 11)).y;
 }
 
 // `cosine`: of the light to the surface's normal; below 0: light from many sides, of which a dielectric reflects the mean (Kulla and

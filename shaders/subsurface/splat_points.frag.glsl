@@ -12,6 +12,8 @@ void main()
     return;
   }
   vec4 belongs = point_instances_fetch(texel);
-  vec3 flux = PI * cells_fetch(texel).w * cell_direct_fetch(texel).rgb;  // of a white surface: the tint is in it
-  enters(place.xyz, flux, -1.0, int(belongs.x + 1.5), int(belongs.w + 0.5), point_entry_fetch(texel));
+  int object = int(belongs.x + 1.5);
+  vec3 direct = (box_of(object) < 0.0) ? cell_whole_fetch(texel).rgb : cell_direct_fetch(texel).rgb;
+  vec3 flux = PI * cells_fetch(texel).w * direct;  // of a white surface: the tint is in it
+  enters(place.xyz, flux, -1.0, object, int(belongs.w + 0.5), point_entry_fetch(texel));
 }

@@ -1,6 +1,6 @@
 // What a lamp's view sees of objects below which light scatters: where the light of a texel enters, and how much
-// (subsurface/flux.glsl). `film_view` is the lamp's view. A ray to a texel takes the place of a raster, so that all that blocks
-// light does.
+// (subsurface/flux.glsl). `film_view` is the lamp's view of the box `group_seen` of objects: others have views of their own. A ray
+// to a texel takes the place of a raster, so that all that blocks light does, or colours it.
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "light/sources.glsl"
@@ -15,7 +15,8 @@ void main()
   vec3 origin = view_origin(gl_FragCoord.xy);
   vec3 way = view_direction(gl_FragCoord.xy);
   ivec2 hit;
-  float t = trace_nearest(origin, way, 1e29, hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index))).x, hit);
+  uint salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index))).x;
+  float t = trace_layers(origin, way, 1e29, 0.0, salt, glass_stops != 0, true, hit);
   if (t >= 1e29) {
     return;
   }
@@ -29,7 +30,7 @@ void main()
   bool behind = dot(normal, way) > 0.0;
   vec4 sides = object_texel(int(instance));
   int object = int((behind ? sides.y : sides.x) + 0.5);
-  if (object == 0) {
+  if (object == 0 || int(box_of(object)) != group_seen) {
     return;
   }
   normal = behind ? -normal : normal;
@@ -37,7 +38,7 @@ void main()
   vec3 direction;
   float away;
   float area;
-  vec3 flux = texel_flux(place, direction, away, area);
+  vec3 flux = texel_flux(place, direction, away, area) * layers_color(t);
   int listed = first_object + OBJECT_TEXELS * (object - 1);
   int cell = cell_near(place, normal, object_texel(listed + 1), object_texel(listed + 2));
   vec4 painted = (cell >= 0) ? point_entry_fetch(ivec2(cell & (ROW - 1), cell / ROW)) : vec4(1.0);
