@@ -215,7 +215,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
         settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer, depsgraph=depsgraph)
-        result = None
+        result, told_of = None, []  # ledgers of the eyes that are done
         try:
             check_tree(settings.passes)
             eyes = tuple((eye, self._camera_of(depsgraph, snapshot, eye)) for eye in eyes_of(scene))
@@ -225,11 +225,13 @@ class CandelaEngine(bpy.types.RenderEngine):
                     result = self._tell(progress, result, layer.name)
                     if progress.pixels is not None:
                         self._end(result, progress, order, layer.name, started)
-                        result, ledger = None, progress.ledger
+                        result = None
+                        told_of.append(progress.ledger)
                 if self.test_break():
                     parts.close()
                     if result is not None:
                         self.end_result(result, cancel=True, do_merge_results=True)  # what is there stays in view
+                    self._warn(told_of)
                     return
             self._tell(FINISHED, None, layer.name)
         except (ValueError, RuntimeError) as error:
@@ -238,12 +240,18 @@ class CandelaEngine(bpy.types.RenderEngine):
         except Exception as error:
             self._fail_unforeseen(error)
             return
-        ledger.times["total"] = time.perf_counter() - started + self._sync_seconds
-        if not self.is_preview:
-            for note in ledger.notes:
-                self.report({"WARNING"}, str(note))
-            if ledger.bad_pixels:
-                self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
+        told_of[-1].times["total"] = time.perf_counter() - started + self._sync_seconds
+        self._warn(told_of)
+
+    def _warn(self, told_of: list[ledgers.Ledger]) -> None:
+        """Report what the ledgers of finished pictures, one for each eye, warn of: each note once."""
+        if self.is_preview:
+            return
+        for note in dict.fromkeys(note for ledger in told_of for note in ledger.notes):
+            self.report({"WARNING"}, str(note))
+        bad = sum(ledger.bad_pixels for ledger in told_of)
+        if bad:
+            self.report({"WARNING"}, f"{bad} values were not finite and were set to 0.")
 
     def _end(self, result, done: final.Progress, order: final.Order, layer: str, started: float) -> None:
         """Hand over the picture of an eye, with what tells of it."""
@@ -290,6 +298,8 @@ class CandelaEngine(bpy.types.RenderEngine):
         picture = progress.picture if progress.pixels is None else progress.pixels["Combined"]
         if picture is not None and result is None:
             height, width = picture.shape[:2]
+            if progress.eye:  # the eyes' cameras were asked for before: the last of them would stay in view
+                self.active_view_set(progress.eye)
             result = self.begin_result(0, 0, width, height, layer=layer, view=progress.eye)
         if progress.picture is not None:
             _fill(result, "Combined", progress.eye, picture)

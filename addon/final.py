@@ -135,12 +135,19 @@ class _Shot:
         limit, passed = self.settings.time_limit, time.perf_counter() - self.started
         return limit and passed + max(limit - passed, 0.0) / self.take.left
 
-    def left(self, samples: float, each: float | None) -> float | None:
-        """Seconds that are left, by what a sample takes and by the time limit; None before the first sample."""
+    def left(self, done: float, wanted: int, each: float | None) -> float | None:
+        """Seconds that are left for this eye's takes and those of the eyes that follow, by what a sample takes and by
+        the time limit, which each eye has for itself; None before the first sample."""
         if each is None:
             return None
-        limit, left = self.settings.time_limit, (samples + TAIL) * each
-        return min(left, max(self.started + limit - time.perf_counter(), 0.0)) if limit else left
+        of_eye = self.of // len(self.order.eyes)
+        follow = (self.of - self.take.number - self.take.left) // of_eye
+        own, other = (self.take.left * wanted - done + TAIL) * each, (of_eye * wanted + TAIL) * each
+        if self.settings.time_limit:
+            own = min(own, max(self.started + self.settings.time_limit - time.perf_counter(), 0.0))
+        if self.order.settings.time_limit:
+            other = min(other, self.order.settings.time_limit)
+        return own + follow * other
 
     def share(self, samples: float, wanted: int) -> float:
         """Of all that is drawn, what is done."""
@@ -217,7 +224,7 @@ def _samples(
         if done == shown:
             news = inside.news(time.perf_counter()) if shows else None
             if news is not None:
-                left = shot.left(take.left * wanted - inside.done, pace.each or inside.each)
+                left = shot.left(inside.done, wanted, pace.each or inside.each)
                 told = sentence(shown, wanted, left, news)
                 news = Progress(told, shot.share(inside.done, wanted), left=left, eye=take.eye)
             yield news
@@ -234,7 +241,7 @@ def _samples(
             showing += took
             next_picture = now + took + max(SHOW_S, took / SHOW_SHARE)
         pace.learn(shown - before, time.perf_counter())
-        left = shot.left(take.left * wanted - shown, pace.each or inside.each) if shows else None
+        left = shot.left(shown, wanted, pace.each or inside.each) if shows else None
         yield Progress(sentence(shown, wanted, left), shot.share(shown, wanted), picture, left, take.eye)
         if meter is not None and shown < wanted:
             with turn:
