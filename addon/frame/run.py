@@ -385,7 +385,7 @@ class Renderer:
             wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
         if plan.fills("subsurface"):
             wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
-        return list(dict.fromkeys(map(passes.as_run, wanted)))
+        return list(dict.fromkeys(wanted))
 
     def _light_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
         """Equal for two pictures whose surfaces receive the same light, but for objects that move; lamps first."""

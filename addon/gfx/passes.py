@@ -67,13 +67,6 @@ def computed(program: Program, formats: tuple[str, ...], adds: bool = False) -> 
     )  # fmt: skip
 
 
-def as_run(program: Program) -> Program:
-    """A program as this device runs it, to be compiled ahead."""
-    if not (program.fragment.startswith(OF_PIXELS) and computes_beat_fragments()):
-        return program
-    return computed(program, ("RGBA32F",) * len(program.outputs))
-
-
 def each_pixel(program: Program, target: Target, *, adds: bool = False, rows=None, **bindings) -> None:
     """Put what a program of pixels (`program_of_pixels`) gives into a target's images, or add it there: by fragments or
     by a compute program of the same body, whichever this device runs faster. Of some `rows` (from, to) or of all."""

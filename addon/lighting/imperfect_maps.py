@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..frame.picture import Frame
+from ..frame.settings import Settings
 from ..frame.technique import Technique
 from ..gfx import geometry, images, passes
 from ..gfx.library import Program
@@ -30,6 +31,7 @@ from ..scene.surface_points import RUNS, TEXELS, SurfacePoints
 from ..sources import lights
 from ..sources.rates import Rate
 from . import repeated_light
+from .caustic_casters import answered
 from .loop import tinted_casters
 from .visibility import BY_POINTS, NO_VIEWS, SHADOWS_BY, Batch, LightPoint, Lookup, Maps, VisibilityProvider
 
@@ -46,6 +48,7 @@ IMPERFECT = Lookup(
     constants=(*MAP_CONSTANTS, ("FLOAT", "half_extent")),
     maps=False,
 )
+AS_CAUSTICS = "depth maps, since its light that passes glass arrives as caustics, and maps of points let it pass, too"
 SPLAT = Program(
     name="surfaces into maps",
     vertex="ism/splat.vert.glsl",
@@ -81,6 +84,7 @@ PUSH = passes.fullscreen_program(
     constants=(("INT", "map_side"), ("FLOAT", "threshold"), ("FLOAT", "half_extent")),
     outputs=PLANE_OUTPUT,
 )
+PROGRAMS = (SPLAT, PULL, PUSH)
 
 
 class SmallMaps:
@@ -197,6 +201,11 @@ def by_points(frame: Frame, technique: Technique) -> bool:
     return not why
 
 
+def programs_by_points(settings: Settings) -> tuple[Program, ...]:
+    """What maps of points are drawn by, where they are asked for."""
+    return PROGRAMS if settings.value("accumulated_maps", SHADOWS_BY) == BY_POINTS else ()
+
+
 class ImperfectMaps(VisibilityProvider):
     """Of single points of flat lamps, of suns and of directions of the world: many in a sample."""
 
@@ -207,9 +216,15 @@ class ImperfectMaps(VisibilityProvider):
         self._maps.begin(frame, technique, POINTS, "shadow")
 
     @staticmethod
-    def serves(emitter: lights.Emitter) -> bool:
-        """Whether it is a wide light: flat, or a sun with a disc."""
-        return emitter.is_flat or (emitter.kind == lights.SUN and emitter.radius > 0.0)
+    def serves(frame: Frame, technique: Technique, emitter: lights.Emitter) -> bool:
+        """Whether it is a wide light, flat or a sun with a disc, of which no part arrives as caustics; else the
+        ledger's row of the `technique` says so: glass stops none of it in maps of points, as it has to there."""
+        if not (emitter.is_flat or (emitter.kind == lights.SUN and emitter.radius > 0.0)):
+            return False
+        if answered(frame, emitter):
+            frame.account.chose(technique, emitter.light.name, AS_CAUSTICS)
+            return False
+        return True
 
     def rate(self, frame: Frame, rate: Rate) -> Rate:
         left = IN_ALL - int(np.log2(max(frame.settings.samples, 1))) if frame.settings.schedule.known_total else AT_ONCE

@@ -32,9 +32,12 @@ rays: docs/log/2026-11-26-soft-shadows.md.
 from __future__ import annotations
 
 from ..frame.picture import Frame
-from ..lighting.imperfect_maps import ImperfectMaps, by_points
+from ..frame.settings import Settings
+from ..gfx.library import Program
+from ..lighting.imperfect_maps import ImperfectMaps, by_points, programs_by_points
 from ..lighting.point_maps import CUTOFF, EDGE_RAYS, PointMaps
 from ..lighting.visibility import RESOLUTION, SHADOWS_BY, VisibilityProvider
+from ..snapshot.scene import Snapshot
 from ..sources import lights
 
 
@@ -46,17 +49,21 @@ class AccumulatedMaps(PointMaps):
     def __init__(self):
         super().__init__()
         self._imperfect = ImperfectMaps()
-        self._by_points = False
+        self._by_points: frozenset[str] = frozenset()  # keys of wide lights that have small maps from points
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return programs_by_points(settings)
 
     def begin(self, frame: Frame) -> None:
         super().begin(frame)
         seen = frame.receivers is not None and len(frame.receivers.distance) > 0
-        self._by_points = seen and by_points(frame, self) and any(map(self._imperfect.serves, frame.emitters))
+        served = frame.emitters if seen and by_points(frame, self) else ()
+        self._by_points = frozenset(one.light.key for one in served if self._imperfect.serves(frame, self, one))
         if self._by_points:
             self._imperfect.begin(frame, self)
 
     def serving(self, emitter: lights.Emitter) -> VisibilityProvider:
-        return self._imperfect if self._by_points and self._imperfect.serves(emitter) else self
+        return self._imperfect if emitter.light.key in self._by_points else self
 
     def release(self) -> None:
         super().release()

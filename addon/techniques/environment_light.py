@@ -41,9 +41,10 @@ from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..lighting import depth_maps
 from ..lighting.caustic_casters import bright_world
-from ..lighting.imperfect_maps import IMPERFECT, ImperfectMaps, by_points
+from ..lighting.imperfect_maps import AS_CAUSTICS, IMPERFECT, ImperfectMaps, by_points, programs_by_points
 from ..lighting.light_rates import LightRates, world_rate
 from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
 from ..lighting.maps_or_rays import compared
@@ -98,9 +99,7 @@ def _with_known(lookup: Lookup) -> Lookup:
 
 KNOWN = {lookup: _with_known(lookup) for lookup in (HARD, RAYS, IMPERFECT)}
 KNOWN_LIGHTING = tuple(
-    lighting(KNOWN[lookup], soft_lobes, 1 << lights.DIRECTION)
-    for lookup in (HARD, RAYS)
-    for soft_lobes in (False, True)
+    lighting(KNOWN[lookup], soft_lobes, 1 << lights.DIRECTION) for lookup in KNOWN for soft_lobes in (False, True)
 )
 OPENNESS = passes.fullscreen_program(
     "openness to the world",
@@ -172,12 +171,18 @@ class EnvironmentLight(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_environment_light(snapshot)
 
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return programs_by_points(settings)
+
     def begin(self, frame: Frame) -> None:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         self._give_openness()
         patches = self._patches(frame) is not None
         self._by_points = not patches and _cast_shadows(frame) and by_points(frame, self)
+        if self._by_points and bright_world(frame) is not None:
+            self._by_points = False
+            frame.account.chose(self, "the world", AS_CAUSTICS)
         if self._by_points:
             self._imperfect.begin(frame, self)
         self._edges = None if patches or self._by_points else self._tables(frame, directions_rate(frame))

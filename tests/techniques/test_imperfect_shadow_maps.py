@@ -6,6 +6,8 @@ import pytest
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from tests.techniques.test_caustics import ball, glass
+from tests.techniques.test_caustics_of_meshes_and_worlds import world_with_a_bright_zenith
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
 
 NAME = "imperfect_shadow_maps"
@@ -176,11 +178,11 @@ def test_maps_do_not_depend_on_the_scale_of_the_scene(stage, render, scale):
 # Wide lamps and the sky: points of theirs with maps of points ---------------------------------------------------------
 
 
-def direct_light(stage, by, samples=1, size=(32, 32)):
+def direct_light(stage, by, samples=1, size=(32, 32), bounces=0):
     """Diffuse direct radiance by a kind of shadows of points."""
     stage.scene.candela.slot_shadow = "accumulated_maps"
     stage.scene.candela.accumulated_maps_by = by
-    images = render_passes(stage.scene, "CANDELA", samples, 0, size=size, bounces=0).images
+    images = render_passes(stage.scene, "CANDELA", samples, 0, size=size, bounces=bounces).images
     assert ledger.latest().bad_pixels == 0
     return light_paths(images)["diffuse_direct"].mean(axis=2)
 
@@ -225,3 +227,22 @@ def test_light_that_glass_colours_has_depth_maps_and_says_so(stage):
     stage.camera_above()
     direct_light(stage, "POINTS", size=(16, 12))
     assert "colours the light" in str(ledger.latest().row("accumulated_maps").choices)
+
+
+@pytest.mark.parametrize("source", ["lamp", "world"])
+def test_glass_whose_light_arrives_as_caustics_has_depth_maps_and_says_so(stage, source):
+    """Light must not pass a ball of glass straight, too: below it is the full shadow that depth maps draw."""
+    stage.floor(material=stage.diffuse(0.8))
+    ball(stage, glass(stage), place=(0, 0, 0.6), segments=48)
+    stage.scene.candela.slot_caustics = "screen_space_photons"
+    if source == "lamp":
+        stage.light("AREA", location=(0, 0, 2), size=0.3, energy=50)
+    else:
+        world_with_a_bright_zenith(stage)
+    stage.camera_above(0.6)
+    stage.scene.candela.slot_indirect = "OFF"
+    by_maps, by_points = (direct_light(stage, by, 4, (16, 16), bounces=1).mean() for by in ("MAPS", "POINTS"))
+    print(by_maps, by_points)
+    assert by_points == pytest.approx(by_maps, rel=0.05)
+    name = "accumulated_maps" if source == "lamp" else "environment_light"
+    assert "as caustics" in str(ledger.latest().row(name).choices)
