@@ -11,7 +11,7 @@ object says of itself is taken over from the last walk where the updates since t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from operator import and_
 
@@ -103,7 +103,7 @@ def walk(
     notes: dict[Note, None] = {}
     known: dict[tuple, Source] = {}
     before, kept = cache.facts, {}
-    told = cache.informed and not cache.arranged and shown is None
+    told = cache.informed and not cache.arranged
     changed = cache.changed
     view_layer = depsgraph.view_layer_eval
     hairy, final = len(bpy.data.particles) > 0, depsgraph.mode == "RENDER"
@@ -143,7 +143,7 @@ def walk(
                 )
                 data_uid = own_data.session_uid if is_own else 0
                 name = original.session_uid, parent_uid, data_uid
-                facts = before.get(name)
+                facts, visible = before.get(name), shown is None or bool(shown(found))
                 if facts is None or not told or not (changed.isdisjoint(name) and changed.isdisjoint(facts.ancestors)):
                     top = owner if parent is None else parent
                     ancestors = _ancestors(owner)
@@ -152,7 +152,7 @@ def walk(
                     # A holdout is one for the camera too, wherever it stands.
                     unseen = indirect_only and not cuts and top.indirect_only_get(view_layer=view_layer)
                     made = ObjectFacts(
-                        shown=shown is None or bool(shown(found)),
+                        shown=visible,
                         name=original.name,
                         uid=name[0],
                         parent_uid=parent_uid,
@@ -177,6 +177,8 @@ def walk(
                     )
                     if made != facts:
                         facts = made
+                elif facts.shown != visible:  # no update tells of what a viewport alone hides
+                    facts = replace(facts, shown=visible)
                 kept[name] = facts
                 if kind == "MESH" and not hair and not (use_volumes if facts.smoke else solid):
                     known[identity] = LEFT_OUT

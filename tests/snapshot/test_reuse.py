@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.snapshot import SnapshotCache
+from addon.snapshot import SnapshotCache, instances
 
 
 def counts(snapshot):
@@ -263,3 +263,26 @@ def test_instances_that_did_not_change_are_the_same_objects(stage, informed):
     after = stage.take(cache).instances
     assert [a is b for a, b in zip(before, after)] == [True, True, False, True]
     assert stage.take(cache).instances is after
+
+
+def test_what_a_viewport_hides_does_not_make_it_read_all_objects_again(stage, monkeypatch):
+    """As with a closed eye of a collection: each object is asked whether it is shown, and one alone for all else."""
+    cache, hidden, read = SnapshotCache(), {"O1"}, []
+    placed = [stage.link(f"O{k}", stage.mesh()) for k in range(4)]
+
+    def taken(cache):
+        return stage.take(cache, shown=lambda one: one.name not in hidden)
+
+    taken(cache)
+    original = instances.own_settings
+    monkeypatch.setattr(instances, "own_settings", lambda owner: read.append(owner.name) or original(owner))
+    for now_hidden in ({"O1"}, {"O3"}):
+        with stage.telling(cache):
+            placed[2].location.x += 1.0
+        hidden.clear()
+        hidden.update(now_hidden)
+        read.clear()
+        found = taken(cache)
+        assert read == ["O2"]
+        assert told(found) == told(taken(SnapshotCache())) and len(found.instances) == 3
+    assert len(stage.take(cache).instances) == 4  # no longer hidden
