@@ -142,7 +142,9 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         looks_through = space.camera if space.use_local_camera else depsgraph.scene.camera
         if looks_through is not None and looks_through.type != "CAMERA":
             looks_through = None
-    hidden, shown = _hidden(space, depsgraph), None
+    if viewport.dirty:  # which the update does that tells of an eye; to ask all collections in each redraw takes long
+        viewport.closes_eyes = _closes_eyes(depsgraph.view_layer_eval.layer_collection)
+    hidden, shown = _hidden(space, viewport.closes_eyes), None
     if hidden:
         shown = lambda shown_object: shown_object.visible_in_viewport_get(space)  # noqa: E731
     if viewport.hidden != hidden:
@@ -179,13 +181,12 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
 _KINDS = [p.identifier for p in bpy.types.SpaceView3D.bl_rna.properties if p.identifier.startswith("show_object_view")]
 
 
-def _hidden(space, depsgraph) -> tuple[str, ...]:
+def _hidden(space, closes_eyes: bool) -> tuple[str, ...]:
     """Names of what the region's own settings hide: other than in local view or in its collections, and kinds; and
     whether the eye of a collection is closed, whose objects Blender lists nevertheless."""
     own = [name for name in ("local_view", "use_local_collections") if getattr(space, name, None)]
     kinds = [name for name in _KINDS if not getattr(space, name, True)]
-    closed = ("collections",) if _closes_eyes(depsgraph.view_layer_eval.layer_collection) else ()
-    return (*own, *kinds, *closed)
+    return (*own, *kinds, *(("collections",) if closes_eyes else ()))
 
 
 def _closes_eyes(layer_collection) -> bool:

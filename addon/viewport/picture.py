@@ -67,6 +67,7 @@ class Viewport:
         self.render_pass: RenderPass | None = None  # shown in the picture's place
         self.paused = False  # the artist wants no more samples for now
         self.hidden: tuple = ()  # what the region's own settings hide
+        self.closes_eyes = False  # whether the view layer does, of a collection
         self.news = False  # a ledger that the panels do not show yet
         self.reported = ""  # the error that was reported last
         self.failed_at: tuple | None = None  # the region's size and kind of view when the error came

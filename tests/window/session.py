@@ -699,7 +699,8 @@ def fresh():
     other = module.Viewport()
     with there():
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        visible = (lambda one: one.visible_in_viewport_get(space)) if module._hidden(space, depsgraph) else None
+        closes_eyes = module._closes_eyes(depsgraph.view_layer_eval.layer_collection)
+        visible = (lambda one: one.visible_in_viewport_get(space)) if module._hidden(space, closes_eyes) else None
 
         def source(camera, width, height):
             return module.take(depsgraph, other.cache, width, height, view=camera, shown=visible)
