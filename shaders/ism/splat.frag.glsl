@@ -38,6 +38,9 @@ void main()
     discard;
   }
   out_plane = plane_pack(own);
+  if (half_extent > 0.0) {  // the stored normal is not quite this one: it tilts the plane about what the texel sees, not about the map's middle
+    out_plane.x = dot(plane_unpack(out_plane).normal, met.xyz) + BIAS * half_extent;
+  }
   float depth = along / (abs(along) + depth_unit);
   gl_FragDepth = (half_extent > 0.0) ? 0.5 + 0.5 * depth : depth;
 }

@@ -93,6 +93,14 @@ void main()
     middle = direction.xy / (cosine + direction.z);
     size = sine / (cosine + direction.z);
   }
+  // A point whose middle lies outside the picture is left out whole: of a square that reaches into its map, it stays inside.
+  vec2 inside = clamp(middle, vec2(-0.99), vec2(0.99));
+  vec2 outside_by = abs(middle - inside);
+  if (size < 1.0 && max(outside_by.x, outside_by.y) > size + 0.01) {
+    return;
+  }
+  size += max(outside_by.x, outside_by.y);
+  middle = inside;
   // No larger than the map, whose middle then serves as well.
   middle = (size >= 1.0) ? vec2(0.0) : middle;
   vec2 extent = float(map_side) * vec2(float(map_columns), float(map_rows));

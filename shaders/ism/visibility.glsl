@@ -10,13 +10,16 @@ float texel_visibility(ivec2 tile, ivec2 texel, vec3 place, vec3 normal, float s
 {
   Plane blocker = plane_unpack(virtual_maps_fetch(tile + texel).xy);
   float behind = dot(place, blocker.normal) - (blocker.distance - BIAS * parallel);
+  // Maps of directions are as wide as the picture: there, what is not bent away at all needs little of the slack.
+  float alike = -dot(normal, blocker.normal);
+  float bend = sqrt(max(1.0 - alike * alike, 0.0));
+  slack *= (parallel > 0.0 && alike > 0.5) ? clamp(10.0 * bend, 0.1, 1.0) : 1.0;
   if (blocker.distance <= 0.0 || behind <= slack) {
     return 1.0;
   }
-  float alike = -dot(normal, blocker.normal);
   TexelRay ray = texel_ray(texel, map_side, parallel);
   float apart = length(ray.start + ray.direction * min(plane_along(blocker, ray, parallel), 1e15) - place);
-  return (alike > 0.5 && behind < 0.75 * apart * sqrt(max(1.0 - alike * alike, 0.0)) + slack) ? 1.0 : 0.0;
+  return (alike > 0.5 && behind < 0.75 * apart * bend + slack) ? 1.0 : 0.0;
 }
 
 // The share that a surface sees of a map's point, or of its direction: bilinear between what four texels say.

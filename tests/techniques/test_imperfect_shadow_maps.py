@@ -219,6 +219,32 @@ def test_the_sky_beside_a_wall_is_its_open_share(stage):
     assert ledger.latest().row("environment_light").counters["maps"] >= 64
 
 
+def test_what_reaches_into_the_map_of_a_sun_from_outside_casts_its_shadow(stage):
+    """A triangle of which only the tip hides the picture; its middle lies outside the map."""
+    stage.floor(material=stage.diffuse(0.8))
+    tip = stage.mesh([(-0.25, 0, 0.3), (-2.1, -1, 0.3), (-2.1, 1, 0.3)], [(0, 1, 2)], material=stage.diffuse(0.2))
+    tip.visible_camera = False
+    stage.light("SUN", energy=5.0, angle=0.02)
+    stage.camera_above(span=2.0)
+    lit = 1 - 0.5 * 0.75 * (2 * 0.75 / 1.85) / 4  # of the picture; 2 x 2 m
+    found = direct_light(stage, "POINTS")
+    assert found.mean() / found[0, -1] == pytest.approx(lit, abs=0.004)
+
+
+@pytest.mark.parametrize(("pieces", "height", "leak"), [(1, 0.4, 0.001), (48, 2.0, 0.01)])
+def test_a_wide_view_has_the_shadows_of_what_is_low(stage, pieces, height, leak):
+    """A roof of 80 m over a floor of which 200 m are seen: it hides the sun at any height, in many pieces, too."""
+    stage.floor(400.0, material=stage.diffuse(0.8))
+    steps = np.linspace(-40, 40, pieces + 1)
+    vertices, row = [(x, y, height) for y in steps for x in steps], pieces + 1
+    faces = [(k, k + 1, k + row + 1, k + row) for k in range(row * pieces) if k % row < pieces]
+    stage.mesh(vertices, faces, material=stage.diffuse(0.2)).visible_camera = False
+    stage.light("SUN", energy=5.0, angle=0.02)
+    stage.camera_above(span=200.0, height=100.0)
+    found = direct_light(stage, "POINTS")
+    assert found[12:20, 12:20].mean() < leak * found[0, 0]
+
+
 def test_light_that_glass_colours_has_depth_maps_and_says_so(stage):
     stage.floor(material=stage.diffuse(0.8))
     tinted = stage.material("ShaderNodeBsdfTransparent", Color=(1.0, 0.1, 0.1, 1.0))
