@@ -19,6 +19,8 @@ vec4 edit_of_surface(Surface s, vec3 viewer)
     return vec4(0.0);
   }
   q = (edits.frozen.w > 0.5 && !(bent && solid)) ? quaternion_product(q, quaternion_between(r, meant)) : q;
-  float number = (bent && solid && edits.frozen.w > 0.5) ? edits.shape.z / FROZEN_NUMBERS : 0.0;
+  // A length of 2.5 and more would be that of an edit of what glass mirrors: later eyes have no number.
+  bool keeps = bent && solid && edits.frozen.w > 0.5 && edits.shape.z < 0.5 * FROZEN_NUMBERS;
+  float number = keeps ? edits.shape.z / FROZEN_NUMBERS : 0.0;
   return normalize(q) * ((solid ? 2.0 : 1.0) + (mirrored ? 2.0 : 0.0) + number);
 }

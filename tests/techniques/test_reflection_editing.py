@@ -665,6 +665,26 @@ def test_freeze_keeps_what_is_seen_through_closed_glass(stage, mirrored):
     assert np.abs(shown(1, False, places) - expected).max() > 0.3
 
 
+def test_the_edit_of_glass_stays_however_many_views_are_frozen(stage, monkeypatch):
+    """Of the 512th frozen view and later ones the eye is not known, the edit of what passes is."""
+    from addon.techniques import reflection_editing
+
+    ball = sphere(stage, stage.material("ShaderNodeBsdfRefraction", IOR=1.4, Roughness=0.0), rings=16)
+    nodes, links = stage.world((1, 1, 1), 1.0).node_tree.nodes, stage.scene.world.node_tree.links
+    links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], nodes["Background"].inputs["Color"])
+    constrain(ball, (0, -1, 0), (3, 5, 2), (0, -4, 0))
+    ball.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.4)
+    plain = stage.render(1, (16, 16), bounces=2)["combined"]
+    ball.candela.reflection_editing_freeze = True
+    table = reflection_editing.reflection_edits.edit_table
+    monkeypatch.setattr(
+        reflection_editing.reflection_edits, "edit_table", lambda *given: table(*given[:-1], given[-1] + 599)
+    )
+    found = stage.render(1, (16, 16), bounces=2)["combined"]
+    assert np.abs(found - plain).max() < 1e-3
+
+
 @pytest.mark.parametrize("degrees", [15, 60])
 def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees):
     """Edited rays that point into the ball show what is behind it, not its inside."""

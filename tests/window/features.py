@@ -452,6 +452,7 @@ def bound_reflections(left, scene, lamp, first):
     shape(
         "plane", mirror.active_material, size=6.0, location=(0.0, -7.0, 1.6), rotation=(-math.radians(90.0), 0.0, 0.0)
     )
+    scene.candela.bounces = 2  # one by each mirror
     yield from f12("reflections_mirrored")
     for one in mirror.candela.reflection_editing_constraints:
         one.enabled = False
