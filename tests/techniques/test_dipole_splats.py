@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.techniques.foggy_stage import box
-from tests.techniques.test_image_space_subsurface import COLOR, scattering, shown, slab, sphere
+from tests.techniques.test_image_space_subsurface import COLOR, WALK, scattering, shown, slab, sphere
 
 
 @pytest.fixture
@@ -15,7 +15,7 @@ def splats(stage):
 
 @pytest.mark.parametrize("scale", [0.0, 1.0])
 def test_channels_without_range_are_the_local_limit(splats, scale):
-    slab(splats, scattering(splats, "RANDOM_WALK", scale, (1, 0.2, 0)), half=9.0)
+    slab(splats, scattering(splats, "RANDOM_WALK", scale * WALK, (1, 0.2, 0)), half=9.0)
     splats.light("SUN", energy=np.pi, angle=0.0)
     splats.camera_above(2.0)
     found = shown(splats.render(2, size=(8, 8))).mean(axis=(0, 1))
@@ -28,7 +28,7 @@ def test_channels_without_range_are_the_local_limit(splats, scale):
 
 def lit(splats, *between, size=(8, 8), samples=2, bounces=0, lamp=None, image="combined"):
     """Mean of a block seen from above, with what `between` puts into the scene."""
-    made = slab(splats, scattering(splats, "RANDOM_WALK", 0.3), half=2.0)
+    made = slab(splats, scattering(splats, "RANDOM_WALK", 0.3 * WALK), half=2.0)
     for put in between:
         put(made)
     (lamp or (lambda: splats.light("SUN", energy=np.pi, angle=0.0)))()
@@ -49,7 +49,7 @@ def test_light_takes_the_colour_of_transparent_surfaces(splats):
 
 def test_views_of_several_boxes_bring_light_once(splats):
     def wall(_):
-        box(splats, scattering(splats, "RANDOM_WALK", 0.3), (-2, -2, -9), (2, 2, -5))
+        box(splats, scattering(splats, "RANDOM_WALK", 0.3 * WALK), (-2, -2, -9), (2, 2, -5))
 
     assert lit(splats, wall) == pytest.approx(lit(splats), rel=0.05)
 
