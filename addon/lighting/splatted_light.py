@@ -55,7 +55,7 @@ RAYS = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
     constants=(
-        *(("INT", name) for name in ("first_object", "first_leaf", "group_seen", "glass_stops")),
+        *(("INT", name) for name in ("first_object", "first_leaf", "group_seen", "opaque_glass")),
         ("FLOAT", "offset_size"),
     ),
     outputs=RECORDS,
@@ -210,7 +210,7 @@ class Splats:
                 shift = frame.random("subsurface/grid", number)
                 for box, (low, high) in enumerate(self._boxes):
                     constants = {
-                        "group_seen": box, "glass_stops": int(answered(frame, emitter)), "first_leaf": first_leaf,
+                        "group_seen": box, "opaque_glass": int(answered(frame, emitter)), "first_leaf": first_leaf,
                     }  # fmt: skip
                     for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
                         yield self._seen(frame, points, objects, view, emitter.row(sample, 0, 0, 1.0, each),

@@ -16,7 +16,7 @@ void main()
   vec3 way = view_direction(gl_FragCoord.xy);
   ivec2 hit;
   uint salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index))).x;
-  float t = trace_layers(origin, way, 1e29, 0.0, salt, glass_stops != 0, true, hit);
+  float t = trace_layers(origin, way, 1e29, 0.0, salt, opaque_glass != 0, true, hit);
   if (t >= 1e29) {
     return;
   }
