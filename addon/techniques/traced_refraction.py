@@ -32,6 +32,7 @@ docs/log/2026-11-26-indirect-light.md.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 from ..frame.picture import Frame
@@ -52,6 +53,7 @@ from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.environment import WORLD
 from ..surfaces.draw import LEFT_OUT, SURFACE_TEXTURES, SURFACES, draw_surfaces, surface_bindings
+from ..surfaces.edits_at_hits import EditsAtHits
 from ..surfaces.reflectance import Reflectance
 from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
@@ -111,7 +113,7 @@ class TracedRefraction(Technique):
         ),
     )  # fmt: skip
     reads = SURFACES
-    requests = (GatherBindings, MediaService)
+    requests = (GatherBindings, MediaService, EditsAtHits)
     writes = (
         Write("radiance.transmission_direct", "RGBA32F", "Light that arrives through one interface of glass", True),
         Write("radiance.transmission_indirect", "RGBA32F", "Light that arrives through glass from elsewhere", True),
@@ -155,10 +157,12 @@ class TracedRefraction(Technique):
                 "clear_roughness": clear_roughness(frame),
             },
         }  # fmt: skip
-        if frame.service(ShadedLobes) is None:
-            self._walk(frame, bindings)
-        else:
-            self._draw(frame, asked(frame, FIRST_ALONE, bindings["textures"]), bindings)
+        edits = frame.service(EditsAtHits)
+        with edits.entering(bindings["textures"]["surface_lobe"]) if edits is not None else nullcontext():
+            if frame.service(ShadedLobes) is None:
+                self._walk(frame, bindings)
+            else:
+                self._draw(frame, asked(frame, FIRST_ALONE, bindings["textures"]), bindings)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
 

@@ -14,15 +14,21 @@ vec3 reflected_or_bent(Surface s, vec3 viewer, bool bent)
 }
 
 #ifdef HAS_FROZEN_EYES
-// A direction that a viewer sees through a surface, turned as the middle of its lobe turns to that of the frozen view.
-vec3 entering_frozen(Surface s, vec4 edit, vec3 viewer, vec3 direction)
+// How the middle of the lobe that a viewer sees through a surface turns to that of the frozen view.
+vec4 entering_turn(Surface s, vec4 edit, vec3 viewer)
 {
   int number = int((length(edit) - 2.0) * FROZEN_NUMBERS + 0.5);
   if (number <= 0 || number >= int(0.5 * FROZEN_NUMBERS) || !edits_what_leaves(s)) {
-    return direction;
+    return vec4(0.0, 0.0, 0.0, 1.0);
   }
   vec3 eye = frozen_eyes_fetch(ivec2((number - 1) & 2047, (number - 1) >> 11)).xyz;
   vec3 meant = reflected_or_bent(s, safe_normalize(eye - s.position), true);
-  return quaternion_turned(quaternion_between(reflected_or_bent(s, viewer, true), meant), direction);
+  return quaternion_between(reflected_or_bent(s, viewer, true), meant);
+}
+
+// A direction that a viewer sees through a surface, turned so.
+vec3 entering_frozen(Surface s, vec4 edit, vec3 viewer, vec3 direction)
+{
+  return quaternion_turned(entering_turn(s, edit, viewer), direction);
 }
 #endif

@@ -20,6 +20,9 @@
 #include "indirect/near.glsl"
 #endif
 #include "lib/environment.glsl"
+#ifdef HAS_FROZEN_EYES
+#include "edit/frozen.glsl"
+#endif
 
 // Share of a technique of density `density` against another one of density `other`.
 float power_share(float density, float other)
@@ -46,6 +49,9 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
     vec3 light_arriving = light_sample(light, position, direction, density);
     float lobe_density;
     light_arriving *= interface_value(surface, direction, lobe_density);
+#ifdef HAS_FROZEN_EYES
+    light_arriving *= ((dot(direction, surface.normal) < 0.0) == (dot(direction, geometric_normal) < 0.0)) ? 1.0 : 0.0;
+#endif
     if (density > 0.0) {
       light_arriving *= power_share(light.rate * density, lobe_density);
     }
@@ -142,6 +148,14 @@ void main()
   Interface surface = interface_begin(s.glossy_normal, to_viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
                                       s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
   surface = interface_edited(surface, s);
+#ifdef HAS_FROZEN_EYES
+  if (edits_what_leaves(s) && s.glossy_ior > 1.0) {
+    vec4 turn = entering_turn(s, surface_edit_fetch(pixel), to_viewer);
+    surface.tangent = quaternion_turned(turn, surface.tangent);
+    surface.bitangent = quaternion_turned(turn, surface.bitangent);
+    surface.normal = quaternion_turned(turn, surface.normal);
+  }
+#endif
   vec3 position = s.position;
   vec3 geometric_normal = s.geometric_normal;
   vec3 throughput = vec3(1.0);

@@ -665,6 +665,27 @@ def test_freeze_keeps_what_is_seen_through_closed_glass(stage, mirrored):
     assert np.abs(shown(1, False, places) - expected).max() > 0.3
 
 
+@pytest.mark.slow
+def test_freeze_keeps_the_lamps_that_are_seen_through_frosted_glass(stage):
+    """Light samples through a rough ball that casts no shadow are about as bright; lobes keep the shape of the view."""
+    ball = sphere(stage, stage.material("ShaderNodeBsdfRefraction", IOR=1.4, Roughness=0.5), rings=32)
+    ball.visible_shadow = False
+    stage.light("AREA", (1, 4, 1), turn=(-np.pi / 2, 0, 0), size=1.0, energy=1000)
+    constrain(ball, (0, -1, 0), (3, 5, 2), (0, -4, 0))
+    ball.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    shown = []
+    for angle, frozen in (
+        (0.0, False),
+        (np.radians(30), True),
+        (np.radians(30), False),
+    ):  # the same place of the ball, near the middle of both pictures
+        ball.candela.reflection_editing_freeze = frozen
+        stage.camera((4 * np.sin(angle), -4 * np.cos(angle), 0), (np.pi / 2, 0, angle), 0.6)
+        x = round(15.5 + 16 * np.sin(np.radians(15) - angle) / (4 - np.cos(np.radians(15) - angle)) / np.tan(0.3))
+        shown.append(stage.render(4, (32, 32), bounces=2)["transmission_direct"][14:18, x - 1 : x + 2].mean())
+    assert shown[1] == pytest.approx(shown[0], rel=0.3) and shown[2] < 0.1 * shown[0], shown
+
+
 def test_the_edit_of_glass_stays_however_many_views_are_frozen(stage, monkeypatch):
     """Of the 512th frozen view and later ones the eye is not known, the edit of what passes is."""
     from addon.techniques import reflection_editing
