@@ -257,7 +257,7 @@ def test_light_that_glass_colours_has_depth_maps_and_says_so(stage):
 
 @pytest.mark.parametrize("source", ["lamp", "world"])
 def test_glass_whose_light_arrives_as_caustics_has_depth_maps_and_says_so(stage, source):
-    """Light must not pass a ball of glass straight, too: below it is the full shadow that depth maps draw."""
+    """Light must not pass a ball of glass straight, too: below it is full shadow."""
     stage.floor(material=stage.diffuse(0.8))
     ball(stage, glass(stage), place=(0, 0, 0.6), segments=48)
     stage.scene.candela.slot_caustics = "screen_space_photons"
@@ -267,8 +267,6 @@ def test_glass_whose_light_arrives_as_caustics_has_depth_maps_and_says_so(stage,
         world_with_a_bright_zenith(stage)
     stage.camera_above(0.6)
     stage.scene.candela.slot_indirect = "OFF"
-    by_maps, by_points = (direct_light(stage, by, 4, (16, 16), bounces=1).mean() for by in ("MAPS", "POINTS"))
-    print(by_maps, by_points)
-    assert by_points == pytest.approx(by_maps, rel=0.05)
+    assert direct_light(stage, "POINTS", 2, (12, 12), bounces=1).max() == pytest.approx(0.0, abs=1e-6)
     name = "accumulated_maps" if source == "lamp" else "environment_light"
     assert "as caustics" in str(ledger.latest().row(name).choices)
