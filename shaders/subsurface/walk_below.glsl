@@ -4,6 +4,7 @@
 #define STEPS 64        // what is left then leaves where the walk has left so far
 #define FIRST_CHANCE 3  // steps before chance ends walks
 #define FARTHEST 12.0   // free paths that a ray looks ahead
+#define LEAST_PATH 16.0  // offsets at which walks begin below the surface: where a free path is less than one, none would come out
 
 // What a walk goes through.
 struct Below {
@@ -61,6 +62,8 @@ vec2 even_entry(Even even)
 // Walks on from `origin` along `direction` and returns what is left of the light after STEPS.
 vec3 walk_below(Below below, vec3 origin, vec3 direction, Even even, inout uvec3 roll)
 {
+  float offset = ray_offset(origin);
+  below.free_path = mix(below.free_path, vec3(LEAST_PATH * offset), lessThan(below.free_path, vec3(offset)));
   vec3 per = vec3(1.0) / below.free_path;
   float limit = FARTHEST * max_component(below.free_path);
   vec3 through = vec3(1.0);

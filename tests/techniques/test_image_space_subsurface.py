@@ -138,6 +138,17 @@ def test_a_range_within_a_pixel_is_the_local_limit_to_the_bit(stage):
     assert np.abs(scattered - shown(stage.render(2))).max() < 1e-5
 
 
+def test_a_channel_without_range_leaves_walks_where_it_enters(stage):
+    pictures = []
+    for radius in (0.0, 0.02):
+        stage.clear()
+        sphere(stage, scattering(stage, "RANDOM_WALK", 0.15, (1, 0.2, radius)), 0.8)
+        stage.light("SUN", energy=2)
+        stage.camera_above(2.0)
+        pictures.append(shown(stage.render(4, size=(12, 12))).mean(axis=(0, 1)))
+    assert pictures[0] == pytest.approx(pictures[1], rel=0.1)
+
+
 def test_without_scattering_materials_it_is_skipped_with_a_reason(stage):
     stage.floor()
     stage.light("SUN")
