@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,7 +32,10 @@ from .visibility import RAYS, ray_bindings
 
 FEW_POINTS = 16  # on each lamp, of the world and of emissive meshes, in a picture of few samples
 OTHER_POINTS = 4  # of the world and of emissive meshes, in each sample at least
-LIGHTING = lighting(RAYS, False)
+# With the colours of layers that rays pass; direct light of the picture has its coloured shadows by channel (loop.py).
+LIGHTING = replace(
+    lighting(RAYS, False), name="light of points", defines=(*lighting(RAYS, False).defines, ("LAYERS", "1"))
+)
 
 
 class PointLight:

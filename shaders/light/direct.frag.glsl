@@ -1,7 +1,7 @@
 // Direct light of this sample: one point on each light, or the light as a whole; visibility from depth maps.
 //
 // `generated/visibility` is the lookup of the technique in the shadow slot. With OWN_POINTS it also gives each pixel a
-// point of its own (light/world_rays.glsl).
+// point of its own (light/world_rays.glsl). With either that or LAYERS light takes the colours of layers that its ray passes.
 // The point is the same for all pixels, so a narrow glossy lobe would see a few bright dots. Where rays are traced
 // (light/traced.frag.glsl) such lobes take part of their light from there; both are weighted by the balance of squared
 // densities (Veach's power heuristic), so the sum has the same mean.
@@ -167,7 +167,7 @@ void main()
         }
 #endif
         visibility = light_visibility(light, pixel, start, facing);
-#ifdef OWN_POINTS
+#if defined(OWN_POINTS) || defined(LAYERS)
         vec3 layers = layers_color(1e30);  // that the ray has passed
         from_diffuse *= layers;
         from_glossy *= layers;

@@ -149,6 +149,19 @@ def test_a_channel_without_range_leaves_walks_where_it_enters(stage):
     assert pictures[0] == pytest.approx(pictures[1], rel=0.1)
 
 
+@pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK"])
+def test_light_takes_the_colour_of_what_it_passes_before_it_enters(stage, method):
+    """Of a Transparent BSDF; without its colour, what came from beside the picture had as much of each channel."""
+    sphere(stage, scattering(stage, method, 0.15, (1, 1, 1)), 0.8)
+    filtering = stage.material("ShaderNodeBsdfTransparent", Color=(1, 0.1, 0.0, 1))
+    stage.light("SUN", energy=2)
+    stage.camera_above(2.0)
+    free = shown(stage.render(4, size=(12, 12))).mean(axis=(0, 1))
+    stage.blocker((-3, -3), (3, 3), 1.5, material=filtering)
+    filtered = shown(stage.render(4, size=(12, 12))).mean(axis=(0, 1))
+    assert filtered / free == pytest.approx([1, 0.1, 0.0], abs=0.03)
+
+
 def test_without_scattering_materials_it_is_skipped_with_a_reason(stage):
     stage.floor()
     stage.light("SUN")
