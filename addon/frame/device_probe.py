@@ -8,9 +8,8 @@ whatever else the machine does can only add.
 Kernels are those of the choices that ask: shadow rays between towers (trace/hierarchy.glsl, the same code as pictures
 run), small triangles and whole quads into a depth map, views with nothing in them, passes of one pixel, texels far
 apart from a texture and from an image, edges of a shadow, and steps of arithmetic in a fragment and in a compute
-program. What they leave out: caches that a whole picture fills,
-divergence of scenes with deep trees, alpha. They are good for choices between methods that differ by a factor, not for
-forecasts.
+program. What they leave out: caches that a whole picture fills, divergence of scenes with deep trees, alpha. They are
+good for choices between methods that differ by a factor, not for forecasts.
 """
 
 from __future__ import annotations

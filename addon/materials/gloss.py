@@ -54,15 +54,17 @@ def patterned(graph: Graph) -> bool:
 
 def value(node: Node, name: str, unknown: float = 0.0) -> float:
     """A socket's own value, or `unknown` where it is linked or missing."""
-    socket = node.inputs.get(name)
-    if socket is None or socket.link is not None or socket.value is None:
-        return unknown
-    return float(np.ravel(socket.value)[0])
+    own = _own(node, name)
+    return unknown if own is None else float(own[0])
 
 
 def _luminance(node: Node) -> float:
     """Of a Principled BSDF's base; 1 where it is linked."""
-    socket = node.inputs.get("Base Color")
-    if socket is None or socket.link is not None or socket.value is None:
-        return 1.0
-    return float(np.ravel(socket.value)[:3] @ current().luminance)
+    own = _own(node, "Base Color")
+    return 1.0 if own is None else float(own[:3] @ current().luminance)
+
+
+def _own(node: Node, name: str) -> np.ndarray | None:
+    """Numbers of a socket that has some of its own."""
+    socket = node.inputs.get(name)
+    return None if socket is None or socket.link is not None or socket.value is None else np.ravel(socket.value)

@@ -156,9 +156,9 @@ def test_light_takes_the_colour_of_what_it_passes_before_it_enters(stage, method
     filtering = stage.material("ShaderNodeBsdfTransparent", Color=(1, 0.1, 0.0, 1))
     stage.light("SUN", energy=2)
     stage.camera_above(2.0)
-    free = shown(stage.render(4, size=(12, 12))).mean(axis=(0, 1))
+    free = shown(stage.render(32, size=(12, 12))).mean(axis=(0, 1))
     stage.blocker((-3, -3), (3, 3), 1.5, material=filtering)
-    filtered = shown(stage.render(4, size=(12, 12))).mean(axis=(0, 1))
+    filtered = shown(stage.render(32, size=(12, 12))).mean(axis=(0, 1))
     assert filtered / free == pytest.approx([1, 0.1, 0.0], abs=0.03)
 
 
