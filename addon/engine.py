@@ -8,7 +8,6 @@ viewport.py. All of it is freed in `free_sessions`.
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -34,6 +33,7 @@ from .techniques.film import check_tree
 from .ui import ENGINE
 from .ui.passes import cryptomatte_metadata, missing_passes, render_metadata, wanted_passes
 from .ui.properties import settings_of
+from .viewport import chosen
 
 MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and images stay for their next picture
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
@@ -96,9 +96,11 @@ def register() -> None:
     bpy.utils.register_class(CandelaEngine)
     bpy.app.handlers.load_post.append(_another_file)
     main_loop.register()
+    chosen.register()
 
 
 def unregister() -> None:
+    chosen.unregister()
     main_loop.unregister()
     bpy.app.handlers.load_post.remove(_another_file)
     bpy.utils.unregister_class(CandelaEngine)
@@ -348,7 +350,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         parts = _whole_samples if bpy.app.background else samples_in_parts
         draw = bake.drawing(shared.renderer, parts, main_loop.taken, self.test_break)
         for sentence in bake.left_out(instance, snapshot) if kind in bake.LIT else ():
-            self.report({"WARNING"}, sentence)
+            self.report({"WARNING"}, one_line(sentence))
         self.update_stats("Candela", f"Baking {thing.name}")
         return bake.baked(kind, what, bake.prepared(snapshot, points, width, height), settings, draw)
 
@@ -368,7 +370,6 @@ class CandelaEngine(bpy.types.RenderEngine):
         self.report({"ERROR"}, one_line(sentence))
 
     def _fail_unforeseen(self, error: Exception) -> None:
-        traceback.print_exc()
         self._fail(unforeseen(error))
 
 

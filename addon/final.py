@@ -16,7 +16,7 @@ import numpy as np
 
 from .film import catcher
 from .film.noise import NoiseMeter
-from .film.takes import ONE_EYE, Picture, Take, frame_images, takes_of
+from .film.takes import ONE_EYE, Picture, Take, frame_images, is_light, takes_of
 from .frame import ledger as ledgers
 from .frame import slices, time_steps
 from .frame.light_paths import LIGHT_PATHS
@@ -91,14 +91,17 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[Pixels, ledger
     with turn:
         order.before()
     takes = takes_of(order.snapshot, order.moments, order.catches, order.eyes)
-    wanted, more, held = order.wanted, catcher.IMAGES if order.catches else (), None
+    more, held = catcher.IMAGES if order.catches else (), None
     for eye, of_eye in groupby(takes, key=lambda take: take.eye):
-        picture, settings = Picture(), order.settings
+        picture, settings, wanted = Picture(), order.settings, order.wanted
         started = order.started if eye == takes[0].eye else time.perf_counter()
         for take in of_eye:
+            if picture.images and not order.is_of_slices:  # a group after the first brings light alone
+                wanted = [asked for asked in order.wanted if any(map(is_light, asked.images))]
             if not order.is_of_slices:
                 shows = more if take.is_plate else images_of(wanted, more)
                 settings = replace(settings, shows=frozenset(shows))
+            settings = replace(settings, takes=1 if take.is_plate else take.groups, take=take.number)
             frame = yield from _drawn(_Shot(order, take, settings, len(takes), started, picture))
             with turn:
                 if order.take is not None:
@@ -108,7 +111,7 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[Pixels, ledger
                 settings = replace(settings, time_limit=0.0, noise_threshold=0.0)
                 if not (order.is_of_slices or settings.is_slice):
                     settings = replace(settings, samples=frame.samples_done)
-        if picture.is_sum and GLARE in wanted:
+        if picture.is_sum and GLARE in order.wanted:
             text = "glare is that of each light group for itself: without groups it is whole."
             frame.ledger.notes += (Note("Light groups", text),)
         pixels = pixels_of(picture, frame, order)

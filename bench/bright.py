@@ -1,24 +1,35 @@
 """Isolated bright pixels: `python -m bench bright`.
 
-Counts pixels whose surroundings, the mean of the other eight of 3x3, and whose truth, the mean of 3x3 pixels of Cycles,
-are both FIVE times darker. Such a pixel is light that is found rarely and then counts for all that was missed; glare
-makes a star of it. Truth is rendered only where surroundings tell of some. The scenes of `bench reflections`, sample
-files by name, and paths of .blend files.
+Counts pixels whose surroundings, the mean of the other eight of 3x3, and whose truth, the pixel of Cycles and the mean
+of its 3x3, are FIVE times darker (a small lamp stands alone in both). Such a pixel is light that is found rarely and
+then counts for all that was missed; glare makes a star of it. Said of each is the light path that most of what it has
+more than its surroundings came by. Truth is rendered only where surroundings tell of some. Pictures of ten pages
+(sample files and scenes of glare), the scenes of `bench reflections`, and paths of .blend files. `--page` writes
+docs/reflections.md's table; rows of others stay.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
-from bench.markdown import table
+from bench import markdown
+from bench.cells import ROOT
 
+PAGE = ROOT / "docs" / "reflections.md"
+COMMAND = "python -m bench bright --page"
+HEAD = ["scene", "by surroundings", "and truth", "of"]
 FIVE = 5.0
 LEAST = 0.02  # of the picture's mean: below it nobody sees a pixel
 SIZE = (128, 96)
-FILES = ("caustics_table", "caustics_rings", "emissive_lamp", "hdri_product", "window_interior")
+FILES = (
+    "caustics_table", "caustics_rings", "emissive_lamp", "hdri_product", "window_interior", "cornell_box",
+    "soft_shadow_garden",
+)  # fmt: skip
+BUILT = ("street", "candle", "car")  # of bench/glare_scenes.py
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -26,6 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--truth-samples", type=int, default=512, help="of Cycles")
     parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")
+    parser.add_argument("--page", action="store_true", help="write docs/reflections.md's table")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -35,20 +47,39 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     size = tuple(int(side) for side in options.size.split("x"))
-    rows, total = [["scene", "by surroundings", "and truth"]], 0
-    for name in options.scenes or (*reflection_scenes.SCENES, *glass_scenes.SCENES, *FILES):
+    rows = markdown.rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, HEAD) if options.page else []
+    for name in options.scenes or (*FILES, *BUILT, *reflection_scenes.SCENES, *glass_scenes.SCENES):
         scene = _opened(name)
-        image = render_passes(scene, "CANDELA", options.samples, 1, size=size).images["combined"]
-        alone, found = isolated(luminance(image)), 0
+        images = render_passes(scene, "CANDELA", options.samples, 1, size=size).images
+        light = luminance(images["combined"])
+        alone = found = isolated(light)
         if alone.any():
             truth = render_passes(scene, "CYCLES", options.truth_samples, 1, size=size).images["combined"]
-            found = int((alone & brighter(luminance(image), around(luminance(truth), whole=True))).sum())
-        rows.append([name, str(int(alone.sum())), str(found)])
-        total += found
-        print("  ".join(rows[-1]), flush=True)
-    print(table(rows))
-    print(f"{total} isolated bright pixels.")
+            found = wrong(light, luminance(truth))
+        row = [name, str(int(alone.sum())), str(int(found.sum())), _told(came_by(images, found))]
+        rows = [*(one for one in rows if one[0] != name), row]
+        print("  ".join(row), flush=True)
+        text = f"Isolated bright pixels: {sum(int(one[2]) for one in rows)}.\n\n{markdown.table([HEAD, *rows])}"
+        if options.page:
+            markdown.put_between(PAGE, COMMAND, text)
+    print(text)
     return 0
+
+
+def came_by(images: dict[str, np.ndarray], found: np.ndarray) -> Counter[str]:
+    """How many of the pixels (H, W) have most of what their surroundings lack by which light path. `images`: passes by
+    Candela's names, (H, W, C)."""
+    from addon.compare.passes import light_paths
+
+    paths = {name: luminance(light) for name, light in light_paths(images).items() if name != "direct_light"}
+    if not paths:
+        return Counter()
+    names, more = list(paths), np.stack([light - around(light) for light in paths.values()])
+    return Counter(names[k].replace("_", " ") for k in more.argmax(axis=0)[found])
+
+
+def _told(counted: Counter[str]) -> str:
+    return ", ".join(f"{path} {count}" for path, count in counted.most_common())
 
 
 def luminance(image: np.ndarray) -> np.ndarray:
@@ -77,12 +108,18 @@ def isolated(light: np.ndarray) -> np.ndarray:
     return brighter(light, around(light))
 
 
+def wrong(light: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """(H, W) bool: isolated pixels where the truth is five times darker, too, the pixel as well as its 3x3."""
+    return isolated(light) & brighter(light, np.maximum(truth, around(truth, whole=True)))
+
+
 def _opened(name: str):
     import bpy
 
-    from bench import glass_scenes, reflection_scenes
-    from bench.cells import ROOT
+    from bench import glare_scenes, glass_scenes, reflection_scenes
 
+    if name in BUILT:
+        return getattr(glare_scenes, name)()
     if name in reflection_scenes.SCENES | glass_scenes.SCENES:
         return reflection_scenes.make(name)
     file = Path(name) if name.endswith(".blend") else ROOT / "sample_blends" / f"{name}.blend"

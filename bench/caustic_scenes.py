@@ -9,9 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
-from .shading import one_shader
+from . import shapes
+from .shading import glass, one_shader
+from .shapes import lamp, look_down, plane, solid
 
 ALBEDO = 0.8
 
@@ -27,13 +30,7 @@ class Scene:
 
 
 def clear() -> None:
-    import bpy
-
     bpy.ops.wm.read_factory_settings(use_empty=True)
-
-
-def glass(ior: float = 1.5):
-    return one_shader("Glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0, IOR=ior)
 
 
 def mirror():
@@ -44,36 +41,17 @@ def white():
     return one_shader("White", "ShaderNodeBsdfDiffuse", Color=(ALBEDO, ALBEDO, ALBEDO, 1))
 
 
-def solid(name: str, vertices, faces, surface, smooth: bool, seen: bool = True, place=(0, 0, 0)):
-    import bpy
-
-    data = bpy.data.meshes.new(name)
-    data.from_pydata([tuple(v) for v in vertices], [], faces)
-    data.materials.append(surface)
-    for polygon in data.polygons:
-        polygon.use_smooth = smooth
-    made = bpy.data.objects.new(name, data)
-    made.location = place
-    made.visible_camera = seen
-    bpy.context.scene.collection.objects.link(made)
-    return made
-
-
 def floor(half: float = 3.0, height: float = 0.0, surface=None):
-    corners = [(x * half, y * half, height) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return solid("Floor", corners, [(0, 1, 2, 3)], surface or white(), False)
+    return plane(surface or white(), (0, 0, height), scale=(half, half, 1))
 
 
 def ball(radius: float, place, surface, segments: int = 96):
-    import bpy
+    hidden(shapes.ball(surface, place, radius, segments))
 
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, radius=radius, location=place)
-    made = bpy.context.object
-    made.data.materials.append(surface)
-    made.visible_camera = False
-    for polygon in made.data.polygons:
-        polygon.use_smooth = True
-    return made
+
+def hidden(caster) -> None:
+    """From the camera, which sees all of its light on the floor."""
+    caster.visible_camera = False
 
 
 def ring(radius: float, height: float, bottom: float, surface, segments: int = 192):
@@ -81,21 +59,7 @@ def ring(radius: float, height: float, bottom: float, surface, segments: int = 1
     turns = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     rim = [(radius * np.cos(t), radius * np.sin(t), bottom + z) for z in (0.0, height) for t in turns]
     faces = [(k, (k + 1) % segments, segments + (k + 1) % segments, segments + k) for k in range(segments)]
-    solid("Ring", rim, faces, surface, True, seen=False)
-
-
-def lamp(kind: str, place, target=(0, 0, 0), **settings):
-    import bpy
-    from mathutils import Vector
-
-    data = bpy.data.lights.new(kind, kind)
-    for name, value in settings.items():
-        setattr(data, name, value)
-    made = bpy.data.objects.new(kind, data)
-    made.location = place
-    made.rotation_euler = (Vector(target) - made.location).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(made)
-    return made
+    hidden(solid("Ring", surface, rim, faces, True))
 
 
 def spot(place, target, intensity: float, degrees: float = 60.0, radius: float = 0.05, color=(1, 1, 1)):
@@ -129,13 +93,11 @@ def water() -> None:
         for r in range(count - 1)
         for c in range(count - 1)
     ]
-    solid("Water", vertices, faces, glass(1.33), True, seen=False)
+    hidden(solid("Water", glass(ior=1.33), vertices, faces, True))
     lamp("SUN", (1.2, 0, 2.0), energy=2.0, angle=np.radians(2.0))
 
 
 def suzanne() -> None:
-    import bpy
-
     floor()
     bpy.ops.mesh.primitive_monkey_add(size=1.2, location=(0, 0, 0.85), rotation=(-0.6, 0, 0.4))
     head = bpy.context.object
@@ -144,7 +106,7 @@ def suzanne() -> None:
     for polygon in head.data.polygons:
         polygon.use_smooth = True
     head.data.materials.append(glass())
-    head.visible_camera = False
+    hidden(head)
     spot((1.2, -0.6, 3.2), (0, 0, 0.8), 10.0, 40.0)
 
 
@@ -162,11 +124,11 @@ def occluded_ring() -> None:
     half, top = 0.8, 0.6
     table = [(x * half, y * half, top - d) for d in (0.05, 0.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     sides = [(0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
-    solid("Platform", table, [(3, 2, 1, 0), (4, 5, 6, 7), *sides], surface, False)
+    solid("Platform", surface, table, [(3, 2, 1, 0), (4, 5, 6, 7), *sides])
     for turn in range(4):
         c, s = np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2)
         wall = [(half, y, top + z) for y, z in ((-half, 0), (half, 0), (half, 0.7), (-half, 0.7))]
-        solid("Wall", [(c * x - s * y, s * x + c * y, z) for x, y, z in wall], [(0, 1, 2, 3)], surface, False)
+        solid("Wall", surface, [(c * x - s * y, s * x + c * y, z) for x, y, z in wall], [(0, 1, 2, 3)])
     ring(0.5, 0.25, top, mirror())
     spot((0.6, 0.0, 2.2), (0, 0, 0.7), 1.0, 50.0)
 
@@ -183,14 +145,7 @@ SCENES = {
 
 def camera(span: float, centre: tuple[float, float] = (0.0, 0.0)) -> None:
     """An orthographic camera above, with pixels that are points."""
-    import bpy
-
-    data = bpy.data.cameras.new("Camera")
-    data.type, data.ortho_scale = "ORTHO", span
-    seen = bpy.data.objects.new("Camera", data)
-    seen.location = (*centre, 10.0)
-    bpy.context.scene.collection.objects.link(seen)
-    bpy.context.scene.camera = seen
+    look_down(span, centre)
     bpy.context.scene.render.filter_size = 0.01
 
 

@@ -9,6 +9,7 @@ Cycles' figure is its diffuse indirect light with one diffuse bounce, which is t
 what light it lets through glass stands in its direct light; so a second error is that of all light of the floor, with
 Cycles' direct light as the rest of the truth. Times are processor seconds of all threads of
 whole renders, which other work on the machine does not change; of Candela the second one, since the first may compile.
+From both follows the error of Cycles with its denoiser in the time of photons (bench/equal_time.py).
 
 With `--motion` ball and lamp move 2 cm a frame over so many frames of 64 x 64 pixels, one sample each, instead. Beside
 the mean square of a frame's error stands what is new in it, as `python -m bench indirect --temporal` has it: half the
@@ -27,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import caustic_scenes, markdown
+from . import caustic_scenes, equal_time, markdown
 from .caustic_scenes import ALBEDO, SCENES
 from .moving import new_in_it, of_frame, shifted
 
@@ -108,6 +109,13 @@ def command(options: argparse.Namespace) -> int:
         table = [["", *(SCENES[name].label for name in shown)]]
         table += [[one.label, *(cell(figures[number]) for figures in found)] for one, found in rows.items() if found]
         parts.append(f"**{title}**\n\n{markdown.table(table)}")
+    beside = [one for one in rows if rows[one] and (one.technique == "screen_space_photons" or one.denoised)]
+    if {one.engine for one in beside} == {"CANDELA", "CYCLES"}:
+        equal = [
+            equal_time.row(SCENES[name].label, ((one.engine, rows[one][k][3], rows[one][k][2]) for one in beside))
+            for k, name in enumerate(shown)
+        ]
+        parts.append(equal_time.table(equal, [one.samples for one in beside if one.engine == "CANDELA"]))
     text = "\n\n".join(parts)
     print(text)
     if options.page:
@@ -299,7 +307,7 @@ def motion(count: int) -> str:
     for technique in TECHNIQUES:
         caustic_scenes.make("sphere")
         scene = bpy.context.scene
-        moving = [one for one in scene.objects if one.type == "LIGHT" or one.name.startswith("Sphere")]
+        moving = [one for one in scene.objects if one.type == "LIGHT" or one.name.startswith("Ball")]
         one = Entrant("", "CANDELA", 1, technique)
         configure(scene, one)
         errors, sums = [], []

@@ -54,6 +54,14 @@ ENTRANTS = (
     soft.Entrant("rays, 64 samples", soft.POINTS, soft.BY_RAYS, 64),
 )
 
+SHOWN = (
+    soft.Entrant("DCS, 64 points", DCS, dcs(64)),
+    soft.Entrant("DCS, 16 points", DCS, dcs(16)),
+    soft.Entrant("VSSM", soft.VSSM),
+    soft.Entrant("one ray", soft.POINTS, soft.BY_RAYS),
+    soft.Entrant("rays", soft.POINTS, soft.BY_RAYS, 256),
+)  # of the page's picture, from top to bottom
+
 
 class Truth:
     """Visibility of a scene by many rays, and which pixels show one surface throughout."""

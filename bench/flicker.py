@@ -6,10 +6,13 @@ many samples, in levels of eight bits (sRGB, one exposure for all frames of a sc
     grain     standard deviation over the frames of a pixel's error
     boiling   the same after a blur of 5x5 pixels: what is seen as a picture that breathes
     jitter    peak to peak of the mean error of whole frames
+    error     relMSE of the frames, mean, untrimmed
+    bias      mean of the frames over that of the references; with several seeds its standard error
 
-Errors that stand still count for nothing here: they are what other benchmarks measure. What the reference's own noise,
-known from its two renders, adds to grain and boiling is taken off. Denoised Cycles and EEVEE stand beside. References
-are kept by content. `--film`: the frames as an animation, engines side by side; `--page` keeps rows of other scenes.
+Errors that stand still count for nothing in the first three. What the reference's own noise, known from its two
+renders, adds to grain, boiling and error is taken off. Candela's figures are means over `--seeds`, each with all frames
+of its own; denoised Cycles and EEVEE stand beside with one seed. References are kept by content. `--film`: the frames
+as an animation, engines side by side; `--page` keeps all other rows.
 """
 
 from __future__ import annotations
@@ -20,13 +23,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.cells import ROOT
-from bench.markdown import END, begin, put_between, table
+from bench.markdown import put_between, rows_of, table
 
 COMMAND = "python -m bench flicker"
 PAGE = ROOT / "docs" / "flicker.md"
 SIZE, FRAMES, STEP_PIXELS, BLUR = (160, 120), 10, 1.3, 5
 REFERENCE_SAMPLES = 256  # of each of the two renders
-HEAD = ("scene", "engine", "samples", "frames", "grain", "boiling", "jitter")
+HEAD = ("scene", "engine", "samples", "seeds", "frames", "size", "grain", "boiling", "jitter", "error", "bias")
 PEERS = (
     *(("Cycles, denoised", "CYCLES", samples, (("use_denoising", True),)) for samples in (1, 4, 16)),
     *(("EEVEE", "BLENDER_EEVEE", samples, ()) for samples in (1, 16)),
@@ -45,6 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--film", type=Path, help="write frames into this GIF: first samples, 4 of Cycles, reference")
     parser.add_argument("--frames", type=int, default=FRAMES)
+    parser.add_argument("--seeds", type=int, default=1, help="of Candela: figures are means over so many animations")
     parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")
     parser.add_argument("--no-peers", action="store_true", help="Candela alone")
     parser.add_argument("--page", action="store_true", help=f"write the table into docs/{PAGE.name}")
@@ -61,23 +65,19 @@ def command(options: argparse.Namespace) -> int:
             print("  ".join(row), flush=True)
     print(table([HEAD, *rows]))
     if options.page:
-        scenes = {row[0] for row in rows}
-        kept = [row for row in rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, HEAD) if row[0] not in scenes]
-        put_between(PAGE, COMMAND, table([HEAD, *kept, *rows]))
+        measured_now = {tuple(row[:3]) for row in rows}
+        written = rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, HEAD)
+        kept = [row for row in written if tuple(row[:3]) not in measured_now]
+        names = list(dict.fromkeys(row[0] for row in (*kept, *rows)))
+        put_between(PAGE, COMMAND, table([HEAD, *sorted([*kept, *rows], key=lambda row: names.index(row[0]))]))
     return 0
-
-
-def rows_of(page: str, command: str, head: tuple[str, ...]) -> list[list[str]]:
-    """Rows of a page's table that a command wrote, without its head."""
-    written = page.partition(begin(command))[2].partition(END)[0]
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in written.splitlines() if line[:2] == "| "]
-    return [row for row in cells if len(row) == len(head) and row[0] != head[0]]
 
 
 def measured(name: str, options: argparse.Namespace):
     """Rows of a scene: Candela by number of samples, then its peers."""
     import bpy
 
+    from addon.compare.metrics import compare_radiance
     from addon.compare.reference import reference, render_passes
 
     size = tuple(int(edge) for edge in options.size.split("x"))
@@ -94,19 +94,36 @@ def measured(name: str, options: argparse.Namespace):
     film = {}
     for label, engine, samples, extra in entrants:
         settings = [(scene.cycles, key, value) for key, value in extra]
-        errors = []
-        for number in moved(scene, start, options.frames, size):
-            shown = render_passes(scene, engine, samples, 1, size=size, extra=settings).images["combined"][..., :3]
-            errors.append(levels(shown, exposure) - levels(truths[number], exposure))
-            film.setdefault((engine, samples), []).append(shown)
-        grain, boiling, jitter = figures(np.array(errors))
+        own, ratios = [], []
+        seeds = range(1, 1 + (options.seeds if engine == "CANDELA" else 1))
+        for seed in seeds:
+            frames = [
+                render_passes(scene, engine, samples, seed, size=size, extra=settings).images["combined"][..., :3]
+                for _ in moved(scene, start, options.frames, size)
+            ]
+            film.setdefault((engine, samples), frames)
+            errors = [levels(shown, exposure) - levels(truth, exposure) for shown, truth in zip(frames, truths)]
+            compared = [
+                compare_radiance(label, shown, one.images["combined"], one.half["combined"])
+                for shown, one in zip(frames, found)
+            ]
+            own.append((*figures(np.array(errors)), np.mean([max(one.relmse - one.floor, 0.0) for one in compared])))
+            ratios.append(np.mean(frames) / max(np.mean(truths), 1e-30))
+        grain, boiling, jitter, error = np.mean(own, axis=0)
         grain, boiling = (float(np.sqrt(max(a * a - b * b, 0.0))) for a, b in zip((grain, boiling), noise))
         yield [
-            shown_as, label, str(samples), str(options.frames), f"{grain:.1f}", f"{boiling:.2f}", f"{jitter:.2f}"
+            shown_as, label, str(samples), str(len(seeds)), str(options.frames), options.size, f"{grain:.1f}",
+            f"{boiling:.2f}", f"{jitter:.2f}", f"{error:.4f}", bias_of(ratios),
         ]  # fmt: skip
     if options.film:
         chosen = [film[key] for key in (("CANDELA", options.samples[0]), ("CYCLES", 4)) if key in film]
         write_film(options.film, [*chosen, truths], exposure)
+
+
+def bias_of(ratios: list[float]) -> str:
+    """The mean of ratios by seed as text; of several seeds with its standard error."""
+    mean = f"{np.mean(ratios):.3f}"
+    return f"{mean} ± {np.std(ratios, ddof=1) / np.sqrt(len(ratios)):.3f}" if len(ratios) > 1 else mean
 
 
 def write_film(path: Path, engines: list[list[np.ndarray]], exposure: float) -> None:

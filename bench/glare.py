@@ -34,6 +34,7 @@ STEP, FRAMES = 0.1, 8  # seconds between the strip's frames
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", type=int, default=3, help="runs of which the least time counts")
     parser.add_argument("--profile", action="store_true", help="only the tail beside the CIE's disability glare")
+    parser.add_argument("--pictures", action="store_true", help="only the pictures of docs/glare.md")
     parser.add_argument("--page", action="store_true", help="write the tables into docs/glare.md, and the pictures")
 
 
@@ -49,6 +50,9 @@ def command(options: argparse.Namespace) -> int:
         return 0
     addon.register()
     context.ensure()
+    if options.pictures:
+        errors(True), stability(True), eyes()
+        return 0
     parts = [machine(), errors(options.page), transforms(options.runs), times(options.runs), stability(options.page)]
     text = "\n\n".join(parts)
     print(text)

@@ -50,3 +50,14 @@ def put_between(path: Path, command: str, part: str, stamped: bool = True, made:
 
     said = f"{made or ages.now()}\n\n" if stamped else ""
     write_whole(path, f"{before}{mark}\n\n{said}{part}\n\n{END}{after}")
+
+
+def rows_of(page: str, command: str, head: Sequence[str]) -> list[list[str]]:
+    """Rows, without their heads, of the tables with that head that a command wrote on a page."""
+    rows, ours = [], False
+    for line in page.partition(begin(command))[2].partition(END)[0].splitlines():
+        cells = [cell.strip() for cell in line[1:-1].split("|")] if line.startswith("| ") else []
+        ours = bool(cells or line.startswith("|-")) and (ours or cells == list(head))
+        if ours and cells and cells != list(head):
+            rows.append(cells)
+    return rows

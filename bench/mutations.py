@@ -10,7 +10,9 @@ first one fails. What is printed:
 
 The test that fails must pass without the wrong, where it is run alone: one that always fails notices nothing. Results
 go to out/mutations.json, as far as they came. `--drawn N` takes wrongs drawn at random instead of the list, and tells
-the share that is noticed by room.
+the share that is noticed by room. What was drawn and how it was judged is kept in bench/results, by the line of code
+that each stands in, so that a draw stays what it is where files are added: a run goes on where the last one ended,
+draws others for those whose line is gone, and with `--again` judges anew what was not noticed.
 """
 
 from __future__ import annotations
@@ -18,22 +20,33 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bench import drawn_mutations
 from bench.cells import ROOT
 from bench.markdown import table, write_whole
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
+
 LIST = ROOT / "bench" / "mutations.toml"
 RESULTS = ROOT / "out" / "mutations.json"
+JUDGED = ROOT / "bench" / "results"  # of those that were drawn, a file for each seed
 KILLED, SURVIVED, STALE, BROKEN, EQUIVALENT = "killed", "survived", "stale", "tests fail without it", "equivalent"
-SECONDS = 240  # for the tests of one wrong; longer than that counts as noticed: something hangs
+NOT_JUDGED = "not judged"
+# Of the processor for the tests of one wrong; longer than that counts as noticed: something hangs. By the clock, where
+# others take the processor or nothing is computed, ten times that.
+SECONDS = 240
+NO_TESTS = 5  # pytest's exit code where none was chosen
 
 
 @dataclass(frozen=True)
@@ -98,18 +111,25 @@ def failing(folder: Path, tests: tuple[str, ...]) -> str:
     environment = {name: value for name, value in os.environ.items() if name != "OCIO"}
     try:
         done = subprocess.run(
-            command, cwd=folder, check=False, capture_output=True, text=True, timeout=SECONDS, stdin=subprocess.DEVNULL,
+            command, cwd=folder, check=False, capture_output=True, text=True, timeout=10 * SECONDS,
+            stdin=subprocess.DEVNULL, preexec_fn=_limited if resource else None,
             env={**environment, "PYTHONDONTWRITEBYTECODE": "1"},
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return f"no end after {SECONDS} s"
-    if done.returncode == 0:
+        return f"no end after {10 * SECONDS} s"
+    if done.returncode in (0, NO_TESTS):
         return ""
+    if resource and done.returncode == -signal.SIGXCPU:
+        return f"no end after {SECONDS} s of the processor"
     lines = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
     if "Fatal Python error" in done.stderr:  # where it was: the first lines of what the handler of faults prints
         fault = done.stderr[done.stderr.index("Fatal Python error") :].splitlines()
         lines.append("; ".join(line.strip() for line in fault if line.startswith(("Fatal", "  File")))[:400])
     return lines[0] if lines else (done.stdout + done.stderr).strip().splitlines()[-1]
+
+
+def _limited() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, 2 * SECONDS))
 
 
 def named(line: str) -> str:
@@ -149,27 +169,56 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--drawn", metavar="N", type=int, default=0, help="N wrongs drawn at random instead of the list"
     )
     parser.add_argument("--seed", type=int, default=1, help="of those that are drawn")
+    parser.add_argument(
+        "--files", metavar="N", type=int, default=drawn_mutations.MOST_TESTS,
+        help="files of tests for each wrong that is drawn, the nearest first",
+    )  # fmt: skip
+    parser.add_argument("--again", action="store_true", help="of those that were drawn, judge survivors anew")
 
 
-def chosen(options: argparse.Namespace) -> list[Mutation]:
+def chosen(options: argparse.Namespace, kept: dict[str, dict]) -> list[Mutation]:
+    """`kept`: what was drawn with this seed before, see `drawn`."""
     first, _, step = options.part.partition("/")
-    if options.drawn:
-        found = drawn(options.drawn, options.seed, options.only)
-    else:
-        found = [
-            one for one in read() if not options.only or any(text in f"{one.name} {one.file}" for text in options.only)
-        ]
+    all_of_them = drawn(options.drawn, options.seed, kept) if options.drawn else read()
+    found = [one for one in all_of_them
+             if not options.only or any(text in f"{one.name} {one.file}" for text in options.only)]  # fmt: skip
     return found[int(first) - 1 :: int(step or 1)]
 
 
-def drawn(count: int, seed: int, only: list[str] | None) -> list[Mutation]:
-    """Wrongs that bench/drawn_mutations.py draws, named by their place."""
-    made = []
-    for file, at, old, new, kind in drawn_mutations.drawn(count, seed, only):
+def drawn(count: int, seed: int, kept: dict[str, dict]) -> list[Mutation]:
+    """Wrongs that bench/drawn_mutations.py draws, named by the place where each stood when it was drawn: those of
+    `kept` whose line is still there, with its text and the column of the wrong in it, then others."""
+    made = [one for name, about in kept.items() if (one := located(name, **about))][:count]
+    names, places = {*kept}, {(one.file, one.at) for one in made}
+    for file, at, old, new, kind in drawn_mutations.drawn(count, seed):
         number = (ROOT / file).read_text("utf-8").count("\n", 0, at) + 1
         name = f"{file}:{number} {kind} {old} -> {new}"
-        made.append(Mutation(name, file, old, new, drawn_mutations.tests_for(file), at=at))
+        if len(made) < count and name not in names and (file, at) not in places:
+            names.add(name)
+            made.append(Mutation(name, file, old, new, drawn_mutations.tests_for(file), at=at))
     return made
+
+
+def located(name: str, line: str, column: int, **_: str) -> Mutation | None:
+    """A wrong in today's code: in the line of this text that is nearest to where it stood. None where none is left."""
+    place, _, what = name.partition(" ")
+    file, _, number = place.rpartition(":")
+    what, _, new = what.rpartition(" -> ")
+    path, old, found = ROOT / file, what.rpartition(" ")[2], []
+    start = 0
+    for k, text in enumerate(path.read_text("utf-8").splitlines(keepends=True) if path.is_file() else (), 1):
+        if text.strip() == line:
+            found.append((abs(k - int(number)), start + text.index(line) + column))
+        start += len(text)
+    return Mutation(name, file, old, new, drawn_mutations.tests_for(file), at=min(found)[1]) if found else None
+
+
+def _place_in_line(mutation: Mutation) -> dict[str, object]:
+    """The line of code that a drawn wrong stands in, and the wrong's column there."""
+    text = (ROOT / mutation.file).read_text("utf-8")
+    start = text.rfind("\n", 0, mutation.at) + 1
+    whole = text[start:].partition("\n")[0]
+    return {"line": whole.strip(), "column": mutation.at - start - (len(whole) - len(whole.lstrip()))}
 
 
 def by_room(states: dict[str, str]) -> list[list[str]]:
@@ -186,22 +235,32 @@ def by_room(states: dict[str, str]) -> list[list[str]]:
 
 
 def command(options: argparse.Namespace) -> int:
-    wanted = chosen(options)
+    results = JUDGED / f"mutations_{options.seed}.json" if options.drawn else RESULTS
+    before = json.loads(results.read_text("utf-8")) if results.exists() else {}
+    wanted = chosen(options, before if options.drawn else {})
     if options.list:
         for one in wanted:
             print(f"{one.name:<52} {'stale' if is_stale(one) else '':<6} {one.file}")
         return 0
-    before = json.loads(RESULTS.read_text("utf-8")) if RESULTS.exists() else {}
-    RESULTS.parent.mkdir(exist_ok=True)
+    results.parent.mkdir(exist_ok=True)
+    if options.drawn:
+        for one in wanted:
+            before.setdefault(one.name, {"state": NOT_JUDGED, "by": "", **_place_in_line(one)})
     sound: dict[tuple[str, ...], str] = {}
     with tempfile.TemporaryDirectory(prefix="candela_mutations_") as folder:
         copy_of_tree(Path(folder))
         for one in wanted:
             started = time.monotonic()
+            known = before[one.name]["state"] if options.drawn else NOT_JUDGED
+            if known != NOT_JUDGED and not (options.again and known != KILLED):
+                continue
+            if options.drawn:
+                files, fast = one.tests[: -len(drawn_mutations.FAST)], drawn_mutations.FAST
+                one = replace(one, tests=(*files[: options.files], *fast))
             state, by = judge(one, Path(folder), sound)
-            before[one.name] = {"state": state, "by": by}
+            before[one.name] = before.get(one.name, {}) | {"state": state, "by": by}
             print(f"{state:<9} {one.name:<52} {time.monotonic() - started:5.0f} s  {by}"[:200], flush=True)
-            write_whole(RESULTS, json.dumps(before, indent=1, ensure_ascii=False) + "\n")
+            write_whole(results, json.dumps(before, indent=1, ensure_ascii=False) + "\n")
     states = {one.name: before[one.name]["state"] for one in wanted}
     left = [name for name, state in states.items() if state in (SURVIVED, BROKEN)]
     stale = [name for name, state in states.items() if state == STALE]

@@ -8,7 +8,8 @@ stays dark, and is compared dark.
 
 A row says relMSE of the picture with half and with all samples, without the reference's noise and without the worst
 hundredth of the pixels (edges in few samples), the mean beside Cycles', and the light paths whose mean differs by more
-than SHARE of the picture's light; then how many sentences Candela itself says about what it leaves out. `--page` writes
+than SHARE of the picture's light beyond the references' noise; then how many sentences Candela itself says about what
+it leaves out. A file is alike if neither the error nor any light path's mean is off. `--page` writes
 docs/other_files.md, worst first.
 """
 
@@ -92,7 +93,7 @@ def render(path: Path, options: argparse.Namespace) -> dict:
     addon.register()
     why = open_mainfile(path)
     if why:
-        return {"state": f"Blender cannot open it: {why}"}
+        return {"state": f"Blender cannot open it: {why}".replace(f"{ROOT}/", "")}
     untrusted.contain(compositing=False)
     scene = bpy.context.scene
     scene.render.use_sequencer = scene.render.use_multiview = scene.render.use_border = False
@@ -125,14 +126,23 @@ def render(path: Path, options: argparse.Namespace) -> dict:
     found, _ = differences(own, first, second, options.tolerance)
     values = {name: (float(error), float(mean)) for name, error, mean in map(str.split, found)}
     error, mean = values.get("combined", (0.0, 1.0))
-    light = max(float((first["combined"][..., :3] + second["combined"][..., :3]).mean()) / 2, 1e-30)
-    worse = [
-        f"{name} {share:+.1%}"
-        for name in values
-        if abs(share := float((own[name] - (first[name] + second[name]) / 2)[..., :3].mean()) / light) > SHARE
-    ]
-    return {"state": "off" if error > options.tolerance else "alike", "error": error, "mean": mean,
+    worse = paths_that_differ(own, first, second)
+    state = "off" if error > options.tolerance or worse else "alike"
+    return {"state": state, "error": error, "mean": mean,
             "off": worse, "said": said, "seconds": seconds, "few": before, "cycles": cycles}  # fmt: skip
+
+
+def paths_that_differ(own: dict, first: dict, second: dict) -> list[str]:
+    """Light paths, `combined` among them, whose mean differs from that of both references together by more than SHARE
+    of the picture's light and twice what the references differ by. Images: (H, W, 3 or 4)."""
+    means = {name: [float(of[name][..., :3].mean()) for of in (own, first, second)] for name in own}
+    light = max(sum(means["combined"][1:]) / 2, 1e-30)
+    found = []
+    for name, (mine, one, other) in means.items():
+        share = (mine - (one + other) / 2) / light
+        if abs(share) > SHARE + 2 * abs(one - other) / light:
+            found.append(f"{name} {share:+.1%}")
+    return found
 
 
 def add_camera(scene) -> bool:
@@ -220,7 +230,8 @@ def page(rows: list[Row], options: argparse.Namespace) -> str:
     said = (
         f"{len(rows)} files, {options.samples} samples of Candela with all light beside two renders of "
         f"{options.reference_samples} samples of Cycles, {options.size[0]}x{options.size[1]} at most. "
-        f"{len(drawn)} could be compared; {alike} have a relMSE of at most {options.tolerance:g}; "
+        f"{len(drawn)} could be compared; {alike} have a relMSE of at most {options.tolerance:g} and "
+        f"no light path off; "
         f"{ended} ended Blender. relMSE of half the samples and of all; time: processor seconds of all beside those of "
         f"a render of Cycles, without compiling."
     )

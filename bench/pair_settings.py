@@ -192,7 +192,9 @@ def shader_aov(room):
 
     def level(layers: dict) -> str:
         found = layers["level"]
-        if not np.isfinite(found).all() or found.max() > 2.5 * 1.001 or found.min() < 0 or found.mean() < 0.01:
+        seen = room.block.visible_camera
+        shown = found.mean() >= 0.01 if seen else found.max() == 0.0
+        if not np.isfinite(found).all() or found.max() > 2.5 * 1.001 or found.min() < 0 or not shown:
             return f"the AOV of the block lies in {found.min():.3f} to {found.max():.3f}, mean {found.mean():.3f}"
         return ""
 

@@ -41,6 +41,7 @@ BOUNDS = {1: (0.10, 0.10), 16: (0.03, 0.02)}  # by samples: how far the ratio of
 GREEN, AMBER, RED = "green", "amber", "red"
 APART = 0.01  # of the mean: how far the sum of passes may be from the picture beyond what it is for Cycles
 DEAR = dict.fromkeys(("fog in a box", "smoke", "fog of the world", "absorbing box", "fire"), 6)  # as if met that often
+BLACK = 1e-6  # two pictures whose means are below it are alike: a sun that fog without end lets not through, say
 DARK = 0.1  # of the mean luminance: below it, errors count as absolute
 
 
@@ -228,9 +229,9 @@ def judged(own: np.ndarray, truth: np.ndarray, half: np.ndarray, samples: int, d
         return {"failed": "values that are not finite"}
     if own.shape != truth.shape:
         return {"failed": f"a picture of {own.shape[1]}x{own.shape[0]} pixels beside {truth.shape[1]}x{truth.shape[0]}"}
-    mean, most, relmse = max(float(truth.mean()), 1e-6), *BOUNDS[samples]
+    mean, most, relmse = float(truth.mean()) + BLACK, *BOUNDS[samples]
     error, floor = _of_blocks(own - truth, truth), _of_blocks(half, truth)
-    ratio, apart = float(own.mean()) / mean, _blocks(half).mean(axis=-1)
+    ratio, apart = (float(own.mean()) + BLACK) / mean, _blocks(half).mean(axis=-1)
     of_mean = (0.0, abs(float(half.mean())), 2 * float(np.sqrt((apart**2).sum())) / apart.size)[doubt] / mean
     return {
         "ratio": ratio, "blocks": error, "floor": floor, "negative": int((own < 0).sum()),

@@ -117,36 +117,16 @@ def _blocks(image: np.ndarray) -> np.ndarray:
 def _scene():
     import bpy
 
-    from bench.shading import node_of, one_shader
+    from bench import shapes
+    from bench.shading import dispersing, one_shader
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    glass = one_shader("Prism", "ShaderNodeBsdfGlass", Color=(1, 0, 0, 1), Roughness=0.0, IOR=INDICES[0])
-    tree, joined = glass.node_tree, node_of(glass, "BSDF_GLASS").outputs[0]
-    for k in (1, 2):
-        node, both = tree.nodes.new("ShaderNodeBsdfGlass"), tree.nodes.new("ShaderNodeAddShader")
-        node.inputs["Color"].default_value = (0, k == 1, k == 2, 1)
-        node.inputs["Roughness"].default_value, node.inputs["IOR"].default_value = 0.0, INDICES[k]
-        tree.links.new(joined, both.inputs[0])
-        tree.links.new(node.outputs[0], both.inputs[1])
-        joined = both.outputs[0]
-    tree.links.new(joined, node_of(glass, "OUTPUT_MATERIAL").inputs["Surface"])
-    bpy.ops.mesh.primitive_plane_add(size=8)
+    colors = ((1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1))
     floor = one_shader("Floor", "ShaderNodeBsdfDiffuse", Color=(ALBEDO, ALBEDO, ALBEDO, 1))
-    bpy.context.object.data.materials.append(floor)
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=RADIUS, location=MIDDLE)
-    bpy.context.object.data.materials.append(glass)
-    bpy.context.object.data.shade_smooth()
-    bpy.context.object.visible_camera = False
-    lamp = bpy.data.lights.new("Lamp", "POINT")
-    lamp.energy, lamp.shadow_soft_size = POWER, LAMP_RADIUS
-    made = bpy.data.objects.new("Lamp", lamp)
-    made.location = LAMP
-    camera = bpy.data.cameras.new("Camera")
-    camera.type, camera.ortho_scale = "ORTHO", SPAN
-    scene.camera = bpy.data.objects.new("Camera", camera)
-    scene.camera.location = (0, 0, 5)
-    for one in (made, scene.camera):
-        scene.collection.objects.link(one)
+    shapes.plane(floor, (0, 0, 0), scale=(4, 4, 1))
+    shapes.ball(dispersing(tuple(zip(colors, INDICES))), MIDDLE, RADIUS, 96).visible_camera = False
+    shapes.lamp("POINT", LAMP, energy=POWER, shadow_soft_size=LAMP_RADIUS)
+    shapes.look_down(SPAN, height=5.0)
     scene.candela.slot_indirect = "OFF"
     return scene

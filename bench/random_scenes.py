@@ -4,7 +4,8 @@ Each number makes one scene: objects of several kinds under modifiers, Principle
 and mixes, lamps of all kinds and shapes, a world, a camera; in metres, hundredths or hundreds of them. Both engines
 render it without bounces, or with all light, and what differs by more than noise is printed with what the scene holds.
 `--save` writes a scene to a file instead, to be taken apart. `--alone SECONDS` renders as many as fit in that time by
-Candela alone, and tells of pixels that are not finite, of errors, and what memory the process held meanwhile.
+Candela alone, and tells of pixels that are not finite, of errors, and what memory the process held meanwhile, and what
+of it is kept by name; with `--same` the first scene again and again, which tells what stays of a picture.
 """
 
 from __future__ import annotations
@@ -303,17 +304,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--alike", type=int, default=1, metavar="N", help="of those, N in a row share their materials (default 1)"
     )
+    parser.add_argument("--same", action="store_true", help="with --alone: the first scene again and again")
+    parser.add_argument("--every", type=int, default=25, metavar="N", help="scenes between two looks at memory (25)")
     parser.add_argument("--save", metavar="FILE.blend", help="write the first scene to a file and render nothing")
 
 
-def alone(first: int, seconds: float, size: tuple[int, int], samples: int, every: int = 25, alike: int = 1) -> int:
-    """Render scenes from number `first` on for `seconds`; 1 if one of them failed or had pixels that are not finite."""
+def alone(options: argparse.Namespace) -> int:
+    """Render scenes for so many seconds; 1 if one of them failed or had pixels that are not finite."""
     from addon.compare.reference import render_passes
     from addon.frame import ledger
+    from bench.memory import kept
 
-    wrong, held, number, until = [], [], first, time.monotonic() + seconds
+    first, size, samples, every = options.first, options.size, min(options.samples, 4), options.every
+    wrong, held, done, until = [], [], 0, time.monotonic() + options.alone
     while time.monotonic() < until:
-        scene, notes = build(number, alike)
+        number = first if options.same else first + done
+        scene, notes = build(number, options.alike)
         try:
             render_passes(scene, "CANDELA", 1 + number % samples, number, size=size)
             bad = ledger.latest().bad_pixels
@@ -324,12 +330,16 @@ def alone(first: int, seconds: float, size: tuple[int, int], samples: int, every
             print(
                 f"{number}: {bad if isinstance(bad, str) else f'{bad} pixels are not finite'}\n    {notes}", flush=True
             )
-        number += 1
-        if (number - first) % every == 0:
+        done += 1
+        if done % every == 0:
             held.append(resident())
-            print(f"{number - first} scenes, {held[-1]} MiB", flush=True)
+            said = ", ".join(
+                f"{value >> 20} MiB of {name}" if name in ("pool", "images") else f"{value} {name}"
+                for name, value in kept().items()
+            )
+            print(f"{done} scenes, {held[-1]} MiB; {said}", flush=True)
     spent = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-    print(f"{number - first} scenes, {len(wrong)} wrong: {wrong}; {spent:.0f} s of the processor")
+    print(f"{done} scenes, {len(wrong)} wrong: {wrong}; {spent:.0f} s of the processor")
     if len(held) > 3:
         print(f"{held[len(held) // 4]} MiB after a quarter of them, {max(held)} at most, {held[-1]} at the end")
     return int(bool(wrong))
@@ -355,7 +365,7 @@ def command(options: argparse.Namespace) -> int:
         print(notes)
         return 0
     if options.alone:
-        return alone(options.first, options.alone, options.size, min(options.samples, 4), alike=options.alike)
+        return alone(options)
     off = 0
     for number in range(options.first, options.first + options.count):
         scene, notes = build(number)

@@ -16,11 +16,12 @@ import time
 import numpy as np
 
 from . import markdown
-from .reflections import PAGE, SIZE
+from .reflections import PAGE
 from .shading import even_world
 
 COMMAND = "python -m bench reflection_costs --page"
 SAMPLES, REPEATS = 4, 3
+SIZE = (96, 64)
 MATERIALS = (1, 4, 16, 64)
 BOUNCES = (1, 2, 4, 8, 16)
 CONSTRAINTS = (1, 4, 32)
@@ -69,22 +70,23 @@ def cubes(count: int, kind: str):
     """A scene of a mirror and `count` cubes of a material each, beside the camera or behind the mirror."""
     import bpy
 
-    from . import reflection_scenes as scenes
+    from . import shapes
+    from .reflection_scenes import MIRROR, TURNED
+    from .shading import principled
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     even_world((0.5, 0.5, 0.55))
-    scenes._plane(
-        scenes._material("Mirror", (0.9, 0.9, 0.9, 1), **scenes.MIRROR), (0, 3, 0), (np.pi / 2, 0, 0), (3, 2, 1)
-    )
+    mirror = principled("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR)
+    shapes.plane(mirror, (0, 3, 0), (TURNED, 0, 0), (3, 2, 1))
     side = int(np.ceil(np.sqrt(count)))
     for k in range(count):
-        made = scenes._material(f"Cube {k}", (0.2 + 0.6 * (k % 5) / 4, 0.5, 0.8 - 0.6 * (k % 7) / 6, 1))
+        made = principled(f"Cube {k}", (0.2 + 0.6 * (k % 5) / 4, 0.5, 0.8 - 0.6 * (k % 7) / 6, 1))
         if kind != VALUES:
             _varied(made, k)
         x, z = 4 * ((k % side + 0.5) / side - 0.5), 3 * ((k // side + 0.5) / side - 0.5)
-        scenes._cube(made, (x, 5 if kind == UNMET else -2.5, z), 2.0 / side)
-    scenes._area((0, -1, 4), 150, 2)
-    scenes._look((0, -1.2, 0), (0, 3, 0))
+        shapes.cube(made, (x, 5 if kind == UNMET else -2.5, z), 2.0 / side)
+    shapes.area((0, -1, 4), 150, 2)
+    shapes.look((0, -1.2, 0), (0, 3, 0))
     return bpy.context.scene
 
 

@@ -21,78 +21,9 @@ from collections.abc import Callable
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
-from .shading import even_world, node_of, one_shader
-
-
-def _material(name: str, color=(0.8, 0.8, 0.8, 1), tiles: float = 0.0, other=(0.1, 0.1, 0.1, 1), **inputs):
-    """A Principled material; with `tiles` its colour is a chequer of so many tiles over the UV map."""
-    made = one_shader(name, "ShaderNodeBsdfPrincipled", Base_Color=color, **inputs)
-    if tiles:
-        shader = node_of(made, "BSDF_PRINCIPLED")
-        made.node_tree.links.new(_chequer(made, tiles, color, other), shader.inputs["Base Color"])
-    return made
-
-
-def _chequer(material, tiles: float, color, other):
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    place, chequer = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeTexChecker")
-    links.new(place.outputs["UV"], chequer.inputs["Vector"])
-    chequer.inputs["Scale"].default_value = tiles
-    chequer.inputs["Color1"].default_value, chequer.inputs["Color2"].default_value = color, other
-    return chequer.outputs["Color"]
-
-
-def _plane(material, location, turn=(0, 0, 0), scale=(1, 1, 1)):
-    """A square of two metres with a UV map."""
-    mesh = bpy.data.meshes.new("Plane")
-    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
-    layer = mesh.uv_layers.new(name="UVMap")
-    for corner, uv in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
-        layer.uv[corner].vector = uv
-    return _placed(mesh, material, location, turn, scale)
-
-
-def _cube(material, location, size):
-    bpy.ops.mesh.primitive_cube_add(size=size, location=location)
-    bpy.context.object.data.materials.append(material)
-    return bpy.context.object
-
-
-def _ball(material, location, radius):
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=48, ring_count=24)
-    bpy.context.object.data.materials.append(material)
-    bpy.context.object.data.shade_smooth()
-    return bpy.context.object
-
-
-def _placed(mesh, material, location, turn, scale):
-    mesh.materials.append(material)
-    made = bpy.data.objects.new(mesh.name, mesh)
-    made.location, made.rotation_euler, made.scale = location, turn, scale
-    bpy.context.scene.collection.objects.link(made)
-    return made
-
-
-def _area(location, energy, size, target=(0, 0, 0.5)):
-    data = bpy.data.lights.new("Area", "AREA")
-    data.energy, data.size = energy, size
-    made = bpy.data.objects.new("Area", data)
-    made.location = location
-    made.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(made)
-
-
-def _look(location, target, lens=35.0):
-    data = bpy.data.cameras.new("Camera")
-    data.lens = lens
-    made = bpy.data.objects.new("Camera", data)
-    made.location = location
-    made.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(made)
-    bpy.context.scene.camera = made
-
+from .shading import chequer, even_world, principled
+from .shapes import area, ball, cube, look, plane
 
 TURNED = np.pi / 2
 MIRROR = {"Metallic": 1.0, "Roughness": 0.0}
@@ -100,75 +31,76 @@ MIRROR = {"Metallic": 1.0, "Roughness": 0.0}
 
 def corridor() -> None:
     even_world((0.1, 0.12, 0.15))
-    _plane(_material("Floor", (0.7, 0.6, 0.5, 1), 12, (0.2, 0.15, 0.1, 1)), (0, 0, 0), scale=(2, 6, 1))
-    _plane(_material("Left", (0.8, 0.2, 0.1, 1), 10, (0.8, 0.8, 0.7, 1)), (-2, 0, 1.5), (0, TURNED, 0), (1.5, 6, 1))
-    _plane(_material("Right", (0.1, 0.3, 0.8, 1), 10, (0.8, 0.8, 0.7, 1)), (2, 0, 1.5), (0, -TURNED, 0), (1.5, 6, 1))
-    _plane(_material("Back", (0.1, 0.6, 0.2, 1), 6, (0.9, 0.9, 0.3, 1)), (0, -6, 1.5), (-TURNED, 0, 0), (2, 1.5, 1))
-    _plane(_material("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR), (0, 3, 1.5), (TURNED, 0, 0), (1.8, 1.4, 1))
-    _ball(_material("Ball", (0.8, 0.7, 0.2, 1), Roughness=0.6), (-0.8, -3.5, 0.6), 0.6)
-    _area((0, -1, 4), 150, 3, (0, -1, 0))
-    _look((0.4, -1.5, 1.4), (0, 3, 1.3))
+    plane(principled("Floor", (0.7, 0.6, 0.5, 1), 12, (0.2, 0.15, 0.1, 1)), (0, 0, 0), scale=(2, 6, 1))
+    plane(principled("Left", (0.8, 0.2, 0.1, 1), 10, (0.8, 0.8, 0.7, 1)), (-2, 0, 1.5), (0, TURNED, 0), (1.5, 6, 1))
+    plane(principled("Right", (0.1, 0.3, 0.8, 1), 10, (0.8, 0.8, 0.7, 1)), (2, 0, 1.5), (0, -TURNED, 0), (1.5, 6, 1))
+    plane(principled("Back", (0.1, 0.6, 0.2, 1), 6, (0.9, 0.9, 0.3, 1)), (0, -6, 1.5), (-TURNED, 0, 0), (2, 1.5, 1))
+    plane(principled("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR), (0, 3, 1.5), (TURNED, 0, 0), (1.8, 1.4, 1))
+    ball(principled("Ball", (0.8, 0.7, 0.2, 1), Roughness=0.6), (-0.8, -3.5, 0.6), 0.6)
+    area((0, -1, 4), 150, 3, (0, -1, 0))
+    look((0.4, -1.5, 1.4), (0, 3, 1.3))
 
 
 def roughness_map() -> None:
     even_world((0.25, 0.28, 0.35))
-    _plane(_material("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.15, 0.1, 0.25, 1)), (0, 0, 0), scale=(4, 4, 1))
-    metal = _material("Metal", (0.9, 0.85, 0.8, 1), Metallic=1.0)
+    plane(principled("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.15, 0.1, 0.25, 1)), (0, 0, 0), scale=(4, 4, 1))
+    metal = principled("Metal", (0.9, 0.85, 0.8, 1), Metallic=1.0)
     shader = next(node for node in metal.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    rough = _chequer(metal, 8, (0.05, 0.05, 0.05, 1), (0.4, 0.4, 0.4, 1))
+    rough = chequer(metal, 8, (0.05, 0.05, 0.05, 1), (0.4, 0.4, 0.4, 1))
     metal.node_tree.links.new(rough, shader.inputs["Roughness"])
-    _ball(metal, (0, 0, 1.0), 1.0)
-    _area((-2, -3, 4), 200, 2)
-    _look((0, -5, 1.8), (0, 0, 0.9), 50)
+    ball(metal, (0, 0, 1.0), 1.0)
+    area((-2, -3, 4), 200, 2)
+    look((0, -5, 1.8), (0, 0, 0.9), 50)
 
 
 def glass_ball() -> None:
     even_world((0.4, 0.45, 0.5))
-    _plane(_material("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.2, 0.3, 0.2, 1)), (0, 0, 0), scale=(4, 4, 1))
-    _ball(_material("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.45, Transmission_Weight=1.0), (-0.3, -1.2, 0.7), 0.7)
-    _ball(_material("Copper", (0.9, 0.5, 0.3, 1), Metallic=1.0, Roughness=0.25), (0.5, 0.8, 0.9), 0.9)
-    _area((-2, -2, 4), 60, 3)
-    _look((0, -5, 1.6), (0, 0, 0.7), 50)
+    plane(principled("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.2, 0.3, 0.2, 1)), (0, 0, 0), scale=(4, 4, 1))
+    ball(principled("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.45, Transmission_Weight=1.0), (-0.3, -1.2, 0.7), 0.7)
+    ball(principled("Copper", (0.9, 0.5, 0.3, 1), Metallic=1.0, Roughness=0.25), (0.5, 0.8, 0.9), 0.9)
+    area((-2, -2, 4), 60, 3)
+    look((0, -5, 1.6), (0, 0, 0.7), 50)
 
 
 def two_mirrors() -> None:
     even_world((0.05, 0.05, 0.06))
-    _plane(_material("Floor", (0.7, 0.7, 0.7, 1), 8, (0.3, 0.3, 0.35, 1)), (0, 0, 0), scale=(3, 2, 1))
-    mirror = _material("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR)
-    _plane(mirror, (0, 1.5, 1.2), (TURNED, 0, 0), (2, 1.1, 1))
-    _plane(mirror, (0, -1.5, 1.2), (-TURNED, 0, 0), (2, 1.1, 1))
-    _cube(_material("Box", (0.8, 0.2, 0.1, 1), 4, (0.9, 0.8, 0.3, 1), Roughness=0.7), (-0.5, 0.4, 0.4), 0.8)
-    _area((0, 0, 4), 120, 2, (0, 0, 0))
-    _look((1.4, -1.2, 1.5), (-0.6, 1.5, 1.0), 24)
+    plane(principled("Floor", (0.7, 0.7, 0.7, 1), 8, (0.3, 0.3, 0.35, 1)), (0, 0, 0), scale=(3, 2, 1))
+    mirror = principled("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR)
+    plane(mirror, (0, 1.5, 1.2), (TURNED, 0, 0), (2, 1.1, 1))
+    plane(mirror, (0, -1.5, 1.2), (-TURNED, 0, 0), (2, 1.1, 1))
+    cube(principled("Box", (0.8, 0.2, 0.1, 1), 4, (0.9, 0.8, 0.3, 1), Roughness=0.7), (-0.5, 0.4, 0.4), 0.8)
+    area((0, 0, 4), 120, 2, (0, 0, 0))
+    look((1.4, -1.2, 1.5), (-0.6, 1.5, 1.0), 24)
 
 
 def car_paint() -> None:
     even_world((0.15, 0.17, 0.2))
-    _plane(_material("Floor", (0.4, 0.4, 0.4, 1), 10, (0.2, 0.2, 0.2, 1)), (0, 0, 0), scale=(5, 5, 1))
-    paint = _material("Paint", (0.6, 0.02, 0.03, 1), Metallic=0.8, Roughness=0.45, Coat_Weight=1.0, Coat_Roughness=0.03)
-    ball = _ball(paint, (0, 0, 0.8), 0.8)
-    ball.scale = (1.6, 1.0, 1.0)
+    plane(principled("Floor", (0.4, 0.4, 0.4, 1), 10, (0.2, 0.2, 0.2, 1)), (0, 0, 0), scale=(5, 5, 1))
+    paint = principled(
+        "Paint", (0.6, 0.02, 0.03, 1), Metallic=0.8, Roughness=0.45, Coat_Weight=1.0, Coat_Roughness=0.03
+    )
+    ball(paint, (0, 0, 0.8), 0.8).scale = (1.6, 1.0, 1.0)
     for x, size in ((-2, 0.3), (0, 1.0), (2, 2.0)):
-        _area((x, -2, 3.5), 80, size)
-    _look((0.5, -5, 1.8), (0, 0, 0.7), 50)
+        area((x, -2, 3.5), 80, size)
+    look((0.5, -5, 1.8), (0, 0, 0.7), 50)
 
 
 def window_pane() -> None:
     even_world((0.5, 0.55, 0.65))
-    _plane(_material("Ground", (0.5, 0.5, 0.45, 1), 20, (0.3, 0.35, 0.25, 1)), (0, 0, 0), scale=(6, 6, 1))
-    glass = _material("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.5, Transmission_Weight=1.0)
-    pane = _cube(glass, (0, 0, 1.2), 1)
+    plane(principled("Ground", (0.5, 0.5, 0.45, 1), 20, (0.3, 0.35, 0.25, 1)), (0, 0, 0), scale=(6, 6, 1))
+    glass = principled("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.5, Transmission_Weight=1.0)
+    pane = cube(glass, (0, 0, 1.2), 1)
     pane.scale = (3, 0.04, 2.2)
-    _cube(_material("Red", (0.8, 0.1, 0.1, 1), 4, (0.9, 0.7, 0.7, 1)), (-0.7, 1.5, 0.5), 1.0)
-    _cube(_material("Yellow", (0.9, 0.7, 0.1, 1), 4, (0.3, 0.2, 0.1, 1)), (1.5, -2.2, 0.6), 1.2)
-    _look((-1.6, -3.5, 1.6), (0.2, 0, 1.0), 35)
+    cube(principled("Red", (0.8, 0.1, 0.1, 1), 4, (0.9, 0.7, 0.7, 1)), (-0.7, 1.5, 0.5), 1.0)
+    cube(principled("Yellow", (0.9, 0.7, 0.1, 1), 4, (0.3, 0.2, 0.1, 1)), (1.5, -2.2, 0.6), 1.2)
+    look((-1.6, -3.5, 1.6), (0.2, 0, 1.0), 35)
 
 
 def water() -> None:
     even_world((0.4, 0.5, 0.7))
-    _plane(_material("Ground", (0.8, 0.7, 0.5, 1), 12, (0.5, 0.4, 0.3, 1)), (0, 0, -0.6), scale=(5, 5, 1))
-    _plane(_material("Picture", (0.9, 0.2, 0.1, 1), 6, (0.9, 0.9, 0.8, 1)), (0, 4, 1.5), (TURNED, 0, 0), (3, 1.8, 1))
-    water_like = _material("Water", (1, 1, 1, 1), Roughness=0.0, IOR=1.33, Transmission_Weight=1.0)
+    plane(principled("Ground", (0.8, 0.7, 0.5, 1), 12, (0.5, 0.4, 0.3, 1)), (0, 0, -0.6), scale=(5, 5, 1))
+    plane(principled("Picture", (0.9, 0.2, 0.1, 1), 6, (0.9, 0.9, 0.8, 1)), (0, 4, 1.5), (TURNED, 0, 0), (3, 1.8, 1))
+    water_like = principled("Water", (1, 1, 1, 1), Roughness=0.0, IOR=1.33, Transmission_Weight=1.0)
     nodes, links = water_like.node_tree.nodes, water_like.node_tree.links
     waves, bump, place = (nodes.new(f"ShaderNode{name}") for name in ("TexNoise", "Bump", "TexCoord"))
     waves.inputs["Scale"].default_value = 1.5
@@ -177,30 +109,30 @@ def water() -> None:
     links.new(waves.outputs[0], bump.inputs["Height"])
     shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
     links.new(bump.outputs["Normal"], shader.inputs["Normal"])
-    _plane(water_like, (0, 0, 0), scale=(5, 5, 1))
-    _look((0, -4, 1.2), (0, 2, 0.2), 35)
+    plane(water_like, (0, 0, 0), scale=(5, 5, 1))
+    look((0, -4, 1.2), (0, 2, 0.2), 35)
 
 
 def patterned_floor() -> None:
     even_world((0.0, 0.0, 0.0))
-    _plane(_material("Tiles", (0.9, 0.1, 0.05, 1), 4, (0.05, 0.2, 0.9, 1), Roughness=1.0), (0, 0, 0), scale=(2, 2, 1))
-    _plane(_white(), (0, 2, 1), (TURNED, 0, 0), (2, 1, 1))
-    _area((0, 0.5, 3.5), 150, 0.5, (0, 0.5, 0))
-    _look((0, -3.5, 1.6), (0, 2, 0.6), 40)
+    plane(principled("Tiles", (0.9, 0.1, 0.05, 1), 4, (0.05, 0.2, 0.9, 1), Roughness=1.0), (0, 0, 0), scale=(2, 2, 1))
+    plane(_white(), (0, 2, 1), (TURNED, 0, 0), (2, 1, 1))
+    area((0, 0.5, 3.5), 150, 0.5, (0, 0.5, 0))
+    look((0, -3.5, 1.6), (0, 2, 0.6), 40)
 
 
 def picture_off_screen() -> None:
     even_world((0.0, 0.0, 0.0))
-    picture = _material("Picture", (0.9, 0.8, 0.1, 1), 2, (0.02, 0.05, 0.6, 1), Roughness=1.0)
-    _plane(picture, (-2.5, 1.2, 1), (0, TURNED, 0), (1, 1, 1))
-    _plane(_white(), (0, 0, 0), scale=(2.6, 4, 1))
-    _plane(_white(), (0, 2.2, 1), (TURNED, 0, 0), (2.6, 1, 1))
-    _area((1.5, 0.5, 1.5), 100, 0.5, (-2.5, 1.2, 1))
-    _look((0.9, -3.0, 1.2), (0.2, 2.2, 0.6), 45)
+    picture = principled("Picture", (0.9, 0.8, 0.1, 1), 2, (0.02, 0.05, 0.6, 1), Roughness=1.0)
+    plane(picture, (-2.5, 1.2, 1), (0, TURNED, 0), (1, 1, 1))
+    plane(_white(), (0, 0, 0), scale=(2.6, 4, 1))
+    plane(_white(), (0, 2.2, 1), (TURNED, 0, 0), (2.6, 1, 1))
+    area((1.5, 0.5, 1.5), 100, 0.5, (-2.5, 1.2, 1))
+    look((0.9, -3.0, 1.2), (0.2, 2.2, 0.6), 45)
 
 
 def _white():
-    return _material("White", (0.8, 0.8, 0.8, 1), Roughness=1.0, Specular_IOR_Level=0.0)
+    return principled("White", (0.8, 0.8, 0.8, 1), Roughness=1.0, Specular_IOR_Level=0.0)
 
 
 PATHS = {"patterned floor": ("diffuse indirect",), "picture off screen": ("diffuse indirect",)}  # of the others: all

@@ -1,14 +1,21 @@
 """Error and time of reflections and refractions beside Cycles and EEVEE: `python -m bench reflections`.
 
-Each scene of `bench/reflection_scenes.py` is rendered by Cycles with --reference samples (twice, with two seeds, whose
-difference tells the reference's own noise), by Candela with 1, 16 and 64 samples, by Candela with mean colours in
-reflections, by EEVEE with ray tracing and by Cycles with few samples, raw and denoised. The error is relMSE of the
-picture and of what its glossy and transmission passes bring, net of the reference's noise; the mean is the entrant's
-over the reference's. Times are those of whole renders after one that compiled, one after the other on the same machine:
-on a software GPU they say little about a real one.
+Each scene of `bench/reflection_scenes.py` and `bench/glass_scenes.py` is rendered by Cycles with --reference samples
+(twice, with two seeds, whose difference tells the reference's own noise; kept by content), by Candela with 1 to 64
+samples, by EEVEE with ray tracing and by Cycles with few samples, raw and denoised. The error is relMSE of the picture
+and of what its glossy and transmission passes bring, net of the reference's noise; the mean is the entrant's over the
+reference's. Times are processor seconds of whole renders after one that compiled: on a software GPU they say little
+about a real one.
 
-`--page` writes docs/reflections.md's tables, of the scenes that `--only` names or of all; `--pictures FOLDER` keeps PNG
-files.
+`--few`: a row for each scene, whole pictures of 1, 4 and 16 samples, errors no less than a tenth of the reference's
+noise, below which they are not known, and with what light carries the error of the last.
+That is the share of light paths in the squared error of their sum, each pixel weighed as in relMSE: the mean of a
+path's error times the whole error, over that of the whole error's square. Shares add up to one; one is negative where
+its errors hide others'. A second table has the errors beside those of denoised Cycles in as many processor seconds,
+where Cycles' own picture is a truth.
+
+`--page` writes docs/reflections.md's tables; rows of scenes that `--only` does not name stay. `--pictures FOLDER` keeps
+PNG files.
 """
 
 from __future__ import annotations
@@ -20,28 +27,31 @@ from pathlib import Path
 
 import numpy as np
 
-from . import ages, markdown
+from . import ages, equal_time, markdown
+from .figures import RESOLVED
+from .study import size
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
 FEW_COMMAND = "python -m bench reflections --few --page"
+NOISE, NO_TRUTH = "noise of the truth", 0.02  # above it Cycles has not found the light, and nothing is compared in time
 FEW_HEAD = [
-    "scene", "1 sample", "4", "16", "mean, 16", "isolated bright", "its seconds, 1, 4, 16", "Cycles 16 denoised",
-    "its seconds", "least error in its time",
+    "scene", "1 sample", "4", "16", "mean, 16", NOISE, "carries the error, 16", "mean of that",
+    "isolated bright", "its seconds, 1, 4, 16", "Cycles 16 denoised", "its seconds",
+    "commit",
 ]  # fmt: skip
-SIZE, SMALL = (96, 64), (64, 48)
+SAMPLES = (1, 4, 16)  # of `--few`
 PATHS = ("glossy", "transmission")  # that a scene is measured by, unless it names others
 
 
 @dataclass(frozen=True)
 class Entrant:
-    """An engine with its settings. `means`: Candela shows mean colours in reflections."""
+    """An engine with its settings."""
 
     label: str
     engine: str
     samples: int
     denoised: bool = False
-    means: bool = False
 
 
 ENTRANTS = (
@@ -49,20 +59,24 @@ ENTRANTS = (
     Entrant("Candela, 4", "CANDELA", 4),
     Entrant("Candela, 16", "CANDELA", 16),
     Entrant("Candela, 64", "CANDELA", 64),
-    Entrant("Candela, 64, means", "CANDELA", 64, means=True),
     Entrant("EEVEE, 16, ray traced", "BLENDER_EEVEE", 16),
     Entrant("Cycles, 4", "CYCLES", 4),
     Entrant("Cycles, 4, denoised", "CYCLES", 4, denoised=True),
     Entrant("Cycles, 16", "CYCLES", 16),
     Entrant("Cycles, 16, denoised", "CYCLES", 16, denoised=True),
 )
-FEW = tuple(one for one in ENTRANTS if one.label in ("Candela, 1", "Candela, 4", "Candela, 16", "Cycles, 16, denoised"))
+DENOISED = (1, 4, 16, 64)  # samples of Cycles, from whose pictures errors in equal time are read
+FEW = (
+    *(one for one in ENTRANTS if one.engine == "CANDELA" and one.samples in SAMPLES),
+    *(Entrant(f"Cycles, {n}, denoised", "CYCLES", n, denoised=True) for n in DENOISED),
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", help="names of scenes")
     parser.add_argument("--reference", type=int, default=1024, help="samples of each of Cycles' two references")
-    parser.add_argument("--few", action="store_true", help="pictures of few samples at equal time, one row a scene")
+    parser.add_argument("--few", action="store_true", help="pictures of few samples, one row a scene")
+    parser.add_argument("--size", **size("64x48"))
     parser.add_argument("--page", action="store_true", help="write docs/reflections.md's tables")
     parser.add_argument("--pictures", type=Path, help="folder for PNG files")
 
@@ -82,9 +96,10 @@ def command(options: argparse.Namespace) -> int:
     from . import glass_scenes, reflection_scenes
 
     addon.register()
-    if options.few:
-        return _few(options)
     order = [*reflection_scenes.SCENES, *glass_scenes.SCENES]
+    if options.few:
+        _few(order, options)
+        return 0
     for name in options.only or order:
         noise, results = _measure(reflection_scenes.make(name), name, options)
         table, row = _table(noise, results), _summary(name, results)
@@ -94,48 +109,78 @@ def command(options: argparse.Namespace) -> int:
     return 0
 
 
-def _few(options: argparse.Namespace) -> int:
-    """A row for each scene, at SMALL pixels: errors of whole pictures, means, isolated bright pixels and processor
-    seconds, beside Cycles of 16 samples, denoised. `--page`: rows of scenes that were not asked for stay."""
-    from . import bright, glass_scenes, reflection_scenes
-
-    order = [*glass_scenes.SCENES, *reflection_scenes.SCENES]
-    text = PAGE.read_text(encoding="utf-8").partition(markdown.begin(FEW_COMMAND))[2].partition(markdown.END)[0]
-    rows = {cells[0]: cells for cells in map(_cells, text.splitlines()) if cells and cells[0] in order}
+def _few(order: list[str], options: argparse.Namespace) -> None:
+    """Both tables of `--few`. On the page the rows of scenes that were not asked for stay."""
+    page = PAGE.read_text(encoding="utf-8")
+    rows, equal = (
+        {one[0]: one for one in markdown.rows_of(page, FEW_COMMAND, head)}
+        for head in (FEW_HEAD, equal_time.head(SAMPLES))
+    )
     for name in options.only or order:
-        scene = reflection_scenes.make(name)
-        references = [_render(scene, Entrant("", "CYCLES", options.reference), seed, SMALL)[0] for seed in (0, 1)]
-        first, second = (one["picture"] for one in references)
-        truth, noise = (first + second) / 2, error(first, second) / 4
-        _keep(options.pictures, name, "truth", truth)
-        _render(scene, FEW[0], 3, SMALL)  # what compiles is not timed
-        found = {one: _render(scene, one, 7, SMALL) for one in FEW}
-        errors = {one: max(error(images["picture"], truth) - noise, 0.0) for one, (images, _) in found.items()}
-        for one, (images, _) in found.items():
-            _keep(options.pictures, name, one.label, images["picture"])
-        *ours, cycles = FEW
-        picture, limit = found[ours[-1]][0]["picture"], found[cycles][1]
-        light = bright.luminance(picture)
-        alone = bright.isolated(light) & bright.brighter(light, bright.around(bright.luminance(truth), whole=True))
-        least = min(((errors[one], one.samples) for one in ours if found[one][1] <= limit), default=None)
-        rows[name] = [
-            name, *(f"{errors[one]:.4f}" for one in ours),
-            f"{picture.mean() / truth.mean():.3f}", str(int(alone.sum())),
-            ", ".join(f"{found[one][1]:.1f}" for one in ours), f"{errors[cycles]:.4f}", f"{limit:.1f}",
-            "none as fast" if least is None else "{:.4f} ({})".format(*least),
-        ]  # fmt: skip
+        rows[name], points = _few_of(name, options)
         print("  ".join(rows[name]), flush=True)
+        equal.pop(name, None)
+        if float(rows[name][FEW_HEAD.index(NOISE)]) <= NO_TRUTH:
+            equal[name] = equal_time.row(name, points)
+            print("  ".join(equal[name]), flush=True)
+        shown, beside = ([found[one] for one in order if one in found] for found in (rows, equal))
+        text = f"{markdown.table([FEW_HEAD, *shown])}\n\n{equal_time.table(beside, SAMPLES)}"
         if options.page:
-            shown = [rows[one] for one in order if one in rows]
-            markdown.put_between(PAGE, FEW_COMMAND, markdown.table([FEW_HEAD, *shown]))
-    return 0
+            markdown.put_between(PAGE, FEW_COMMAND, text)
+    print(text)
+
+
+def _few_of(name: str, options: argparse.Namespace) -> tuple[list[str], equal_time.Points]:
+    """Errors of whole pictures, means, the light path that carries the error of the last one, isolated bright pixels
+    and processor seconds, beside Cycles of 16 samples, denoised; and the points of all entrants."""
+    from . import bright, reflection_scenes
+
+    scene = reflection_scenes.make(name)
+    known = _reference(scene, options)
+    truth, noise = known.images["combined"][..., :3], _noise(known.images["combined"], known.half["combined"])
+    _keep(options.pictures, name, "truth", truth)
+    for count in (1, 4):
+        _render(scene, replace(FEW[0], samples=count), 3, options.size)  # what compiles is not timed
+    found = {one: _render(scene, one, 7, options.size) for one in FEW}
+    pictures = {one: images["combined"][..., :3] for one, (images, _) in found.items()}
+    errors = {one: max(error(picture, truth) - noise, RESOLVED * noise) for one, picture in pictures.items()}
+    for one, picture in pictures.items():
+        _keep(options.pictures, name, one.label, picture)
+    ours = [one for one in FEW if one.engine == "CANDELA"]
+    last, cycles = ours[-1], next(one for one in FEW if one.engine == "CYCLES" and one.samples == 16)
+    alone = bright.wrong(*(bright.luminance(one) for one in (pictures[last], truth)))
+    path, share, mean = carrier(found[last][0], known.images)
+    return [
+        name, *(f"{errors[one]:.4f}" for one in ours), f"{pictures[last].mean() / truth.mean():.3f}", f"{noise:.4f}",
+        f"{path} ({share:.2f})", f"{mean:.3f}", str(int(alone.sum())),
+        ", ".join(f"{found[one][1]:.1f}" for one in ours), f"{errors[cycles]:.4f}", f"{found[cycles][1]:.1f}",
+        ages.git("rev-parse", "--short=10", "HEAD") or "",
+    ], [(one.engine, seconds, errors[one]) for one, (_, seconds) in found.items()]  # fmt: skip
+
+
+def carrier(found: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> tuple[str, float, float]:
+    """The light path with the largest share in the squared error of the sum of all, that share, and the ratio of its
+    means. Passes by Candela's names, (H, W, C)."""
+    from addon.compare.metrics import relative_squared_error
+    from addon.compare.passes import light_paths
+
+    paths = [{k: v.astype(np.float64) for k, v in light_paths(one).items()} for one in (found, truth)]
+    names = [name for name in paths[0] if name in paths[1] and name != "direct_light"]
+    errors = {name: paths[0][name] - paths[1][name] for name in names}
+    whole, right = sum(errors.values()), sum(paths[1][name] for name in names)
+    # The weight of a pixel in relMSE is what a squared error of one would add there.
+    weight = relative_squared_error(right + 1.0, right)[..., None]
+    square = float((weight * whole**2).sum())
+    shares = {name: float((weight * one * whole).sum()) / max(square, 1e-30) for name, one in errors.items()}
+    path = max(shares, key=shares.get)
+    return path.replace("_", " "), shares[path], float(paths[0][path].mean() / max(paths[1][path].mean(), 1e-30))
 
 
 def _put(name: str, row: list[str], table: str, order: list[str]) -> None:
     """Write a scene's row and table to the page; those of other scenes stay, each with when it was made."""
-    text = PAGE.read_text(encoding="utf-8").partition(markdown.begin(COMMAND))[2].partition(markdown.END)[0]
-    head, *sections = text.split("\n### ")
-    rows = {cells[0]: cells for cells in map(_cells, head.splitlines()) if cells and cells[0] in order}
+    page = PAGE.read_text(encoding="utf-8")
+    _, *sections = page.partition(markdown.begin(COMMAND))[2].partition(markdown.END)[0].split("\n### ")
+    rows = {cells[0]: cells for cells in markdown.rows_of(page, COMMAND, SUMMARY_HEAD)}
     tables = {section.partition("\n")[0].lower(): section.partition("\n")[2].strip() for section in sections}
     made = ages.now()
     rows[name], tables[name.lower()] = row, f"{made}\n\n{table}"
@@ -145,23 +190,38 @@ def _put(name: str, row: list[str], table: str, order: list[str]) -> None:
     markdown.put_between(PAGE, COMMAND, "\n\n".join(parts), stamped=False)
 
 
-def _cells(line: str) -> list[str]:
-    return [cell.strip() for cell in line.strip().strip("|").split("|")] if line.startswith("|") else []
+def _reference(scene, options: argparse.Namespace):
+    from addon.compare.reference import reference
+
+    return reference(scene, options.reference, size=options.size, extra=_bounces(scene))
+
+
+def _bounces(scene) -> list[tuple]:
+    return [(scene.cycles, "glossy_bounces", scene["glossy_bounces"])] if "glossy_bounces" in scene else []
+
+
+def _noise(mean: np.ndarray, half: np.ndarray) -> float:
+    """relMSE of the mean of two renders by half their difference, (H, W, C)."""
+    return error((mean + half)[..., :3], (mean - half)[..., :3]) / 4
 
 
 def _measure(scene, name: str, options: argparse.Namespace) -> tuple[dict[str, float], dict[Entrant, Result]]:
     """The reference's noise by path, and what each entrant made."""
-    references = [_render(scene, Entrant("", "CYCLES", options.reference), seed)[0] for seed in (0, 1)]
+    known = _reference(scene, options)
+    signed = ({key: mean + sign * known.half[key] for key, mean in known.images.items()} for sign in (1, -1))
+    references = [_shown(scene, one) for one in signed]
     truth = {key: (references[0][key] + references[1][key]) / 2 for key in references[0]}
     shown = [key for key in truth if truth[key].mean() > 1e-3]
     noise = {key: error(*(one[key] for one in references)) / 4 for key in shown}
     _keep(options.pictures, name, "Cycles", truth["picture"])
     results, compiled = {}, set()
     for entrant in ENTRANTS:
-        if (entrant.engine, entrant.means) not in compiled:
-            _render(scene, replace(entrant, samples=1), 3)  # what compiles is not timed
-            compiled.add((entrant.engine, entrant.means))
-        found, seconds = _render(scene, entrant, 7)
+        if entrant.engine not in compiled:
+            _render(scene, replace(entrant, samples=1), 3, options.size)  # what compiles is not timed
+            compiled.add(entrant.engine)
+        images, seconds = _render(scene, entrant, 7, options.size)
+        comparable = entrant.engine != "BLENDER_EEVEE" and not entrant.denoised  # only Combined is denoised
+        found = _shown(scene, images if comparable else {"combined": images["combined"]})
         there = [key for key in shown if key in found]
         results[entrant] = Result(
             seconds,
@@ -205,7 +265,7 @@ def _summary(name: str, results: dict[Entrant, Result]) -> list[str]:
 
     def least(seconds: float) -> str:
         candela = [(one.errors["picture"], entrant.samples) for entrant, one in results.items()
-                   if entrant.engine == "CANDELA" and not entrant.means and one.seconds <= seconds]  # fmt: skip
+                   if entrant.engine == "CANDELA" and one.seconds <= seconds]  # fmt: skip
         return "{:.4f} ({} samples)".format(*min(candela)) if candela else "none as fast"
 
     return [
@@ -228,31 +288,28 @@ def error(found: np.ndarray, truth: np.ndarray) -> float:
     return float(relative_squared_error(found.astype(np.float64), truth.astype(np.float64)).mean())
 
 
-def _render(scene, entrant: Entrant, seed: int, size: tuple[int, int] = SIZE) -> tuple[dict[str, np.ndarray], float]:
-    """The picture and what its paths bring, (H, W, 3), and seconds of the render: of SMALL ones of the processors."""
+def _render(scene, entrant: Entrant, seed: int, size: tuple[int, int], extra=()) -> tuple[dict[str, np.ndarray], float]:
+    """Passes by Candela's names, (H, W, C), and processor seconds of the render."""
     from addon.compare.reference import render_passes
 
-    settings = scene.candela
-    settings.property_unset("shaded_reflections_bounces")
-    if entrant.means:
-        settings.shaded_reflections_bounces = 0
     scene.eevee.use_raytracing = True
-    extra = [(scene.cycles, "use_denoising", True)] if entrant.denoised else []
-    if "glossy_bounces" in scene:
-        extra.append((scene.cycles, "glossy_bounces", scene["glossy_bounces"]))
-    clock = time.process_time if size == SMALL else time.perf_counter
-    start = clock()
-    images = render_passes(scene, entrant.engine, entrant.samples, seed, size=size, extra=extra).images
-    seconds = clock() - start
+    settings = [*_bounces(scene), *extra]
+    settings += [(scene.cycles, "use_denoising", True)] if entrant.denoised else []
+    start = time.process_time()
+    images = render_passes(scene, entrant.engine, entrant.samples, seed, size=size, extra=settings).images
+    return images, time.process_time() - start
+
+
+def _shown(scene, images: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The picture and what the scene's paths bring, (H, W, 3), of those that there are."""
     found = {"picture": images["combined"][..., :3]}
     for path in str(scene.get("paths", ",".join(PATHS))).split(","):
         kind, _, order = path.partition(" ")
         parts = [images.get(f"{kind}_{one}") for one in ([order] if order else ["direct", "indirect"])]
         color = images.get(f"{kind}_color")
-        comparable = entrant.engine != "BLENDER_EEVEE" and not entrant.denoised  # only Combined is denoised
-        if comparable and color is not None and all(part is not None for part in parts):
+        if color is not None and all(part is not None for part in parts):
             found[path] = sum(parts)[..., :3] * color[..., :3]
-    return found, seconds
+    return found
 
 
 def _keep(folder: Path | None, name: str, label: str, pixels: np.ndarray) -> None:

@@ -39,3 +39,41 @@ def even_world(color, strength: float = 1.0) -> None:
     node = node_of(world, "BACKGROUND")
     node.inputs["Color"].default_value, node.inputs["Strength"].default_value = (*color, 1.0), strength
     bpy.context.scene.world = world
+
+
+def principled(name: str, color=(0.8, 0.8, 0.8, 1), tiles: float = 0.0, other=(0.1, 0.1, 0.1, 1), **inputs):
+    """A Principled material; with `tiles` its colour is a chequer of so many tiles over the UV map."""
+    made = one_shader(name, "ShaderNodeBsdfPrincipled", Base_Color=color, **inputs)
+    if tiles:
+        shader = node_of(made, "BSDF_PRINCIPLED")
+        made.node_tree.links.new(chequer(made, tiles, color, other), shader.inputs["Base Color"])
+    return made
+
+
+def chequer(material, tiles: float, color, other, output: str = "UV"):
+    """The socket of a new chequer of a material over its UV map or another output of Texture Coordinate."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    place, cells = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeTexChecker")
+    links.new(place.outputs[output], cells.inputs["Vector"])
+    cells.inputs["Scale"].default_value = tiles
+    cells.inputs["Color1"].default_value, cells.inputs["Color2"].default_value = color, other
+    return cells.outputs["Color"]
+
+
+def glass(name: str = "Glass", color=(1, 1, 1, 1), roughness: float = 0.0, ior: float = 1.5):
+    return one_shader(name, "ShaderNodeBsdfGlass", Color=color, Roughness=roughness, IOR=ior)
+
+
+def dispersing(colors_and_indices):
+    """The material of several Glass nodes that are added: (r, g, b, 1) and index of each."""
+    made = one_shader("Dispersing", "ShaderNodeBsdfGlass", Color=colors_and_indices[0][0], IOR=colors_and_indices[0][1])
+    tree = made.node_tree
+    joined = node_of(made, "BSDF_GLASS").outputs[0]
+    for color, ior in colors_and_indices[1:]:
+        node, both = tree.nodes.new("ShaderNodeBsdfGlass"), tree.nodes.new("ShaderNodeAddShader")
+        node.inputs["Color"].default_value, node.inputs["IOR"].default_value = color, ior
+        tree.links.new(joined, both.inputs[0])
+        tree.links.new(node.outputs[0], both.inputs[1])
+        joined = both.outputs[0]
+    tree.links.new(joined, node_of(made, "OUTPUT_MATERIAL").inputs["Surface"])
+    return made

@@ -17,6 +17,12 @@ ROOT = Path(__file__).resolve().parent.parent
 GAP = 4  # pixels between pictures
 
 
+def sample_file(name: str) -> None:
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends" / f"{name}.blend"))
+
+
 @dataclass(frozen=True)
 class Entrant:
     engine: str
@@ -30,16 +36,11 @@ class Entrant:
 class Strip:
     size: tuple[int, int]
     scenes: tuple[str, ...]
-    make: Callable[[str], None]  # leaves the scene of that name open
-    entrants: tuple[Entrant, ...]  # the last sets the exposure: Cycles, where it takes part
+    make: Callable[[str], None] = sample_file  # leaves the scene of that name open
+    entrants: tuple[Entrant, ...] = ()  # the last sets the exposure: Cycles, where it takes part
     bounces: int | None = None
     own_exposure: bool = True  # of each scene; else all have that of the first, as of a flight
-
-
-def sample_file(name: str) -> None:
-    import bpy
-
-    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends" / f"{name}.blend"))
+    drawn: Callable[[str, tuple[int, int]], list[np.ndarray]] | None = None  # (H, W) in 0 to 1, instead of entrants
 
 
 def _medium(name: str) -> None:
@@ -165,6 +166,18 @@ def _unedited(name: str) -> None:
     shown_scenes.edits(name, edited=False)
 
 
+def _edited(name: str) -> None:
+    from bench import edited_scenes
+
+    edited_scenes.make(name)
+
+
+def _not_edited(name: str) -> None:
+    from bench import edited_scenes
+
+    edited_scenes.make(name, edited=False)
+
+
 def _sun(name: str) -> None:
     from bench import shown_scenes
 
@@ -175,6 +188,14 @@ def _sheet(name: str) -> None:
     from bench import shown_scenes
 
     shown_scenes.sheet(name)
+
+
+def _visibilities(family: str, size: tuple[int, int]) -> list[np.ndarray]:
+    """Of the one light of a family of bench/soft_scenes.py."""
+    from bench import edges, soft, soft_scenes
+
+    scene = soft_scenes.build(family)
+    return [soft.visibility(scene, one, size) for one in edges.SHOWN]
 
 
 NO_BOUNCES = ("slot_indirect", "OFF")
@@ -200,12 +221,19 @@ STRIPS = {
             Entrant("CANDELA", 16),
         ),
     ),
+    "edited_scenes": Strip(
+        (256, 192),
+        ("car", "room", "bottle"),
+        _edited,
+        (Entrant("CANDELA", 4, made_by=_not_edited), Entrant("CANDELA", 4)),
+    ),
     "sun": Strip(
         (192, 128),
         ("sun", "lamp", "pupil of 3 mm"),
         _sun,
         (Entrant("CANDELA", 4, (NO_BOUNCES,), shows="film.lens"), Entrant("CANDELA", 4, (NO_BOUNCES,))),
     ),
+    "edge_shadows": Strip((96, 72), ("foliage", "chain fence", "stacked blockers"), drawn=_visibilities),
     "sheet": Strip(
         (128, 96),
         ("sheet", "panes"),
@@ -253,7 +281,7 @@ STRIPS = {
         own_exposure=False,
     ),
     "reflections": Strip(
-        (128, 96),
+        (96, 72),
         ("corridor", "roughness map", "glass ball", "car paint", "window pane", "water"),
         _reflection,
         (Entrant("CANDELA", 1), Entrant("CANDELA", 16), CYCLES),
@@ -299,7 +327,10 @@ def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarra
     from addon.compare.metrics import display
     from addon.compare.reference import render_passes
 
-    pictures = []
+    width, height = strip.size
+    pictures = strip.drawn(scene, strip.size) if strip.drawn else []
+    if pictures:
+        return _stacked([np.repeat(one[..., None], 3, axis=2) for one in pictures], width, height), 0.0
     for one in strip.entrants:
         (one.made_by or strip.make)(scene)
         settings = bpy.context.scene.candela
@@ -309,12 +340,16 @@ def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarra
         pictures.append(_of_frame(one.shows) if one.shows else found.images["combined"][..., :3])
     if exposure is None:
         exposure = float(-np.log2(max(np.percentile(pictures[-1], 97), 1e-6)))
-    width, height = strip.size
+    return _stacked([display(one, exposure) for one in pictures], width, height), exposure
+
+
+def _stacked(pictures: list[np.ndarray], width: int, height: int) -> np.ndarray:
+    """Displayed values, row 0 at the bottom, one above the other with gaps below and to the right; row 0 at the top."""
     column = np.ones(((height + GAP) * len(pictures) - GAP, width + GAP, 3))
     for row, picture in enumerate(pictures):
         top = row * (height + GAP)
-        column[top : top + height, :width] = display(picture, exposure)[::-1]
-    return column, exposure
+        column[top : top + height, :width] = picture[::-1]
+    return column
 
 
 def write_picture(path: Path, shown: np.ndarray) -> None:

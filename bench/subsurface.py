@@ -363,6 +363,41 @@ def clear() -> None:
     bpy.data.batch_remove([*bpy.data.materials, *bpy.data.worlds, *bpy.data.hair_curves, *bpy.data.collections])
 
 
+Shown = Callable[..., tuple[np.ndarray, float]]
+
+
+def opened(name: str, method: str, size: tuple[int, int]) -> Shown:
+    """Leaves the scene open and returns what renders it: of engine, samples and seed (0) the colour, (height, width,
+    3), and the processor seconds that it took."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+
+    clear()
+    (SCENES | THROUGH)[name](method)
+    cycles = bpy.context.scene.cycles
+    cycles.use_denoising = False
+
+    def shown(engine: str, samples: int, seed: int = 0):
+        extra = [(cycles, "use_denoising", True)] if engine == DENOISED else []
+        # Light that glass bends on its way to milk and back is no bounce in Candela.
+        extra += [(cycles, "max_bounces", GLASS_BOUNCES), (cycles, "transmission_bounces", GLASS_BOUNCES)]
+        engine = "CYCLES" if engine == DENOISED else engine
+        before = process_time()
+        bounces = BOUNCES.get(name, 2)
+        passes = render_passes(bpy.context.scene, engine, samples, seed, size=size, bounces=bounces, extra=extra)
+        taken = process_time() - before
+        return passes.images["combined"][..., :3].astype(np.float64), taken
+
+    return shown
+
+
+def scale_of(right: np.ndarray) -> np.ndarray:
+    """What squared errors are divided by, (height, width, 1): of relMSE beside this picture, (height, width, 3)."""
+    bright = (right @ [0.2126, 0.7152, 0.0722])[..., None]
+    return bright**2 + (0.1 * bright.mean()) ** 2
+
+
 _eevee: dict[tuple, tuple[np.ndarray, float]] = {}  # by scene and size: it knows no methods
 
 
@@ -370,31 +405,12 @@ def lines(
     name: str, method: str, size, reference: int, pictures: Path | None, entrants=ENTRANTS
 ) -> list[tuple[str, ...]]:
     """Rows of the table for one scene and method."""
-    import bpy
-
     from addon.compare.png import png
-    from addon.compare.reference import render_passes
 
-    def shown(engine: str, samples: int, seed: int = 0):
-        denoised = engine == DENOISED
-        cycles = bpy.context.scene.cycles
-        extra = [(cycles, "use_denoising", True)] if denoised else []
-        # Light that glass bends on its way to milk and back is no bounce in Candela.
-        extra += [(cycles, "max_bounces", GLASS_BOUNCES), (cycles, "transmission_bounces", GLASS_BOUNCES)]
-        engine = "CYCLES" if denoised else engine
-        before = process_time()
-        bounces = BOUNCES.get(name, 2)
-        passes = render_passes(bpy.context.scene, engine, samples, seed, size=size, bounces=bounces, extra=extra)
-        taken = process_time() - before
-        return passes.images["combined"][..., :3].astype(np.float64), taken
-
-    clear()
-    (SCENES | THROUGH)[name](method)
-    bpy.context.scene.cycles.use_denoising = False
+    shown = opened(name, method, size)
     first, second = (shown("CYCLES", reference, seed)[0] for seed in (11, 12))
     right = (first + second) / 2
-    bright = (right @ [0.2126, 0.7152, 0.0722])[..., None]
-    scale = bright**2 + (0.1 * bright.mean()) ** 2
+    scale = scale_of(right)
     noise = float((((first - second) / 2) ** 2 / scale).mean())
     rows, beside, compiled = [], [right], set()
     for engine, samples in entrants:
@@ -491,11 +507,13 @@ def equal(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
 
 COMMAND = "python -m bench subsurface --page docs/subsurface.md"
 COMMAND_OPAQUE = "python -m bench subsurface --opaque --page docs/subsurface.md"
+PARTS = ("table", "split", "through")
 FEW = (("CANDELA", 1), ("CANDELA", 16), (DENOISED, 16))  # entrants of light that comes through
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     every = [*SCENES, *THROUGH]
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS[:1], metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--scenes", nargs="+", choices=every, metavar="NAME", help="default all of either table")
     parser.add_argument("--opaque", action="store_true", help="scenes in which little light comes through, and EEVEE")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS, metavar="METHOD")
@@ -511,6 +529,19 @@ def command(options: argparse.Namespace) -> int:
     import addon
 
     addon.register()
+    from . import subsurface_split as split
+
+    if "split" in options.parts:
+        for text in split.split(options):
+            print(text, flush=True)
+            if options.page:
+                markdown.put_between(options.page, split.COMMAND, text)
+    if "through" in options.parts:
+        print(split.through(options))
+    return table_of(options) if "table" in options.parts else 0
+
+
+def table_of(options: argparse.Namespace) -> int:
     rows: list[tuple[str, ...]] = []
     entrants = tuple(one for one in ENTRANTS if not (options.no_eevee and one[0] == "BLENDER_EEVEE"))
     through = not options.opaque

@@ -5,7 +5,8 @@ and Blender, and with the newest zip of build/ as the extension. Rendered is cho
 material of glass, and a border are added, one after the other. Of each: seconds until the view shows anything, until it
 shows the scene's light (at first its direct light alone), all of it, and until it rests, and the longest time in which
 Blender did not answer: seconds of the clock, and, in brackets, of all threads of the window's process, which say more
-where other work shares the processors. With `--motion` instead: steps in a second and pixels, while a view turns and
+where other work shares the processors. `--after`: seconds between the choice of this engine, when the second process
+begins to compile, and that of Rendered. With `--motion` instead: steps in a second and pixels, while a view turns and
 while an animation is played, beside EEVEE in the same window.
 """
 
@@ -116,6 +117,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--backend", nargs="+", default=["opengl"], choices=("opengl", "vulkan"))
     parser.add_argument("--steps", nargs="+", default=list(STEPS), choices=STEPS)
     parser.add_argument("--until-light", action="store_true", help="do not wait until the picture rests")
+    parser.add_argument("--after", type=float, default=1.0, metavar="SECONDS", help="from engine to Rendered (1)")
     parser.add_argument("--motion", action="store_true", help="a turning view and playback, beside EEVEE, instead")
     parser.add_argument("--package", type=Path, help="the extension's zip; by default the newest of build/")
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "cold", help="for logs and pictures")
@@ -127,7 +129,7 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     package = options.package or max(ROOT.glob("build/candela-*.zip"), key=lambda path: path.stat().st_mtime)
-    rows, until = [], ["until_light"] if options.until_light else []
+    rows, until = [], [f"after={options.after}", *(["until_light"] if options.until_light else [])]
     with quiet() as terminal:
         for backend in options.backend:
             for scene in scenes_of(list(options.only)):

@@ -11,7 +11,9 @@ import pytest
 
 from addon.cli.refused import Refused
 from addon.cli.slices import read_header
+from addon.cli.terminal import quiet
 from addon.compare.exr_write import write_exr
+from addon.snapshot.errors import unforeseen
 from addon.snapshot.exr import read_exr
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -290,6 +292,37 @@ def test_a_name_cannot_speak_to_the_farm(tmp_path):
     assert "-Shot\\nopenjd_fail: hacked" in done.stdout and "Missing\\nopenjd_fail" in done.stdout
     refused = candela("render", path, "--scene=no\nopenjd_fail: hacked", "--output", "picture.png", folder=tmp_path)
     assert refused.returncode == 2 and refused.stderr.count("\n") == 1, refused.stderr
+
+
+def test_a_report_of_blender_cannot_speak_to_the_farm(capfd):
+    """Of a report the first line is left out, and a name in it may hold the end of a line."""
+    with quiet():
+        print("Warning: cannot find 'wood\nopenjd_fail: hacked'\nopenjd_status: hacked\x1b[2J")
+    said = capfd.readouterr().err.splitlines()
+    assert said == [" openjd_fail: hacked'", " openjd_status: hacked\\x1b[2J"]
+
+
+def test_a_traceback_cannot_speak_to_the_farm(capfd):
+    """Of an error that names something of the file."""
+    try:
+        raise KeyError("Wall") from ValueError("material 'Wall\nopenjd_fail: hacked'")
+    except KeyError as error:
+        sentence = unforeseen(error)
+    said = capfd.readouterr().err
+    assert "openjd_fail" in said and not any(line.startswith("openjd_") for line in said.splitlines())
+    assert sentence.isprintable() and "KeyError" in sentence
+
+
+@pytest.mark.parametrize(
+    ("verb", "names"),
+    [("compare", ("index.html",)), ("compare", ("cycles.png",)), ("farm", ("template.json", "parameter_values.json"))],
+)
+def test_files_of_others_in_the_folder_of_an_output_stay(verb, names, tmp_path):
+    """A page, a picture and a job of another program, by names that Candela gives, too."""
+    for name in names:
+        (tmp_path / name).write_text("mine")
+    assert_refused(candela(verb, CORNELL, "--output", tmp_path, folder=tmp_path), 1, names[0], "not replaced")
+    assert {one.name: one.read_text() for one in tmp_path.iterdir() if one.is_file()} == dict.fromkeys(names, "mine")
 
 
 def test_merge_opens_no_file_that_a_slice_names(tmp_path):

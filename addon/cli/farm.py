@@ -23,13 +23,19 @@ import bpy
 
 from ..snapshot.scene import one_line
 from . import slices, untrusted
-from .files import output, placed_in
+from .files import output, placed_in, refuse_others
 from .refused import USAGE, Refused
 from .verbs import Job
 
 ROOT = Path(__file__).resolve().parents[2]
 FLAMENCO = Path(__file__).with_name("candela_flamenco.js")
 MOST_CHUNKS = 1024  # values that a parameter of tasks may have, by the specification
+# What each file of a bundle holds, and hardly one of another program.
+MARKS = {
+    "template.json": '"name": "Candela: ',
+    "parameter_values.json": '"BlendFile"',
+    "asset_references.json": '"assetReferences"',
+}
 FILE, FOLDER = "{{Param.BlendFile}}", "{{Param.OutputFolder}}"
 
 
@@ -37,6 +43,8 @@ def write_job(job: Job) -> None:
     """Write the bundle. Raises Refused."""
     options, scene = job.options, job.scene
     folder = output(options.output, folder=True)
+    name = options.file.stem
+    refuse_others(folder, MARKS | {f"candela_{name}.js": "Candela"})
     results = (options.results or folder / "pictures").resolve()
     frames = options.frames
     if frames is None and options.frame is not None:
@@ -53,7 +61,6 @@ def write_job(job: Job) -> None:
         slices.check_layers(scene)
     if options.split_samples > scene.candela.samples:
         raise Refused(f"{scene.candela.samples} samples cannot be split into {options.split_samples} slices.", USAGE)
-    name = options.file.stem
     if "{{" in f"{name}{options.assignments}{options.scene}{options.view_layer}":
         raise Refused("Names with {{ have a meaning of their own in job templates; rename the file or the scene.")
     made = template(name, parts, launch(), options)
@@ -116,10 +123,11 @@ def of_rendering(options) -> list[str]:
 
 def flamenco(name: str, options) -> str:
     """The text of the job type of Flamenco for the file of this name, with what the job asks of its tasks."""
-    text = FLAMENCO.read_text(encoding="utf-8").replace('label: "Candela"', f"label: {json.dumps(f'Candela: {name}')}")
+    text = FLAMENCO.read_text(encoding="utf-8")
     for of, arguments in (("OF_EVERY_TASK", of_every_task(options)), ("OF_RENDERING", of_rendering(options))):
         text = text.replace(f"const {of} = [];", f"const {of} = {json.dumps(arguments)};")
-    return text
+    # Last: a name may be a line of the script. An argument can hold no such label, whose quotes are escaped there.
+    return text.replace('label: "Candela"', f"label: {json.dumps(f'Candela: {name}')}")
 
 
 def template(name: str, parts: list[str], start: list[str], options) -> dict:

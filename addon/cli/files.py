@@ -15,6 +15,7 @@ from pathlib import Path
 from .refused import Refused, reason
 
 WRITING = ".writing_"  # how the names of folders begin whose files are not in place yet
+MOST_MARKED = 1 << 16  # letters of a file in which its mark stands
 BLEND_STARTS = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # plain, compressed by zstd, by gzip (before 3.0)
 
 
@@ -52,6 +53,20 @@ def output(path: Path, folder: bool) -> Path:
     except (OSError, RuntimeError) as error:
         raise Refused(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}.") from None
     return path
+
+
+def refuse_others(folder: Path, marks: dict[str, str], beside: tuple[str, ...] = ()) -> None:
+    """Raise Refused where a file of one of these names stands in the folder and does not hold the mark that those have
+    which Candela writes; of the names `beside`, which bear no mark, where none of the marked ones stands."""
+    for name, mark in marks.items():
+        with contextlib.suppress(FileNotFoundError):
+            with (folder / name).open(encoding="utf-8", errors="replace") as file:
+                is_own = mark in file.read(MOST_MARKED)
+            if not is_own:
+                raise Refused(f"{folder / name} was not written by Candela and is not replaced; choose another folder.")
+    for name in beside:
+        if (folder / name).exists() and not any((folder / one).exists() for one in marks):
+            raise Refused(f"{folder / name} was there before and is not replaced; choose another folder.")
 
 
 def _stands(path: Path) -> bool:

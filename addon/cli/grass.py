@@ -9,6 +9,7 @@ from ..grass import directions
 from ..grass.blades import Recipe
 from ..grass.generate import Order, default_folder, generate
 from ..grass.patch import MOST_CHROMA, MOST_LUMA, SUFFIX, PatchError
+from ..snapshot.scene import one_line
 from .files import output
 from .refused import USAGE, Refused
 from .terminal import progress, quiet
@@ -64,4 +65,4 @@ def make_patch(options: argparse.Namespace) -> None:
         raise Refused(str(error)) from None
     except KeyboardInterrupt:
         raise Refused(f"Interrupted after {done} of {whole} views; the same command goes on from there.") from None
-    print(path)
+    print(one_line(str(path)))

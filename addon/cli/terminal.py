@@ -10,6 +10,8 @@ import sys
 from collections.abc import Iterator
 from typing import TextIO
 
+from ..snapshot.scene import one_line
+
 STDOUT, STDERR = 1, 2
 REPORTS = ("Error:", "Warning:", "Info:")  # how Blender's reports begin; those that matter are said otherwise
 
@@ -48,8 +50,9 @@ def quiet(verbose: bool = False) -> Iterator[TextIO]:
             os.close(copy)
         os.close(nowhere)
         for line in said.getvalue().splitlines():
-            if not line.startswith(REPORTS):
-                print(line, file=sys.stderr, flush=True)
+            if not line.startswith(REPORTS):  # of a report whose name holds the end of a line the rest may come here
+                said_here = one_line(line)
+                print(f" {said_here}" if said_here.startswith("openjd_") else said_here, file=sys.stderr, flush=True)
 
 
 def flush() -> None:

@@ -11,6 +11,7 @@ import bpy
 from ..compare import metrics, reference, tune
 from ..frame import ledger as ledgers
 from ..gfx import context
+from ..snapshot.scene import one_line
 from ..techniques import REGISTRY
 from ..ui.properties import settings_of
 from ..ui.tuning import AGAIN, SEED, apply, choices, properties
@@ -57,7 +58,7 @@ def tune_scene(job: Job) -> None:
         print(f"Nothing took less than {options.milliseconds:g} ms; the fastest is marked.")
     if path is not None:
         save(options.file, job.scene.name, best.candidate, path)
-        print(path)
+        print(one_line(str(path)))
 
 
 def _renders(job: Job, layer, truth, deadline: float, seconds: float, terminal):

@@ -15,6 +15,7 @@ import bpy
 
 from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
+from ..compare.report import MADE_BY
 from ..film import point_costs
 from ..film.points import POINTS
 from ..frame import device_probe
@@ -31,7 +32,7 @@ from ..snapshot.scene import Note, Snapshot, one_line
 from ..techniques import REGISTRY, make_registry
 from ..ui.properties import put_values, settings_of
 from . import slices, untrusted
-from .files import output, placed_in, refuse_blend
+from .files import output, placed_in, refuse_blend, refuse_others
 from .intermediate import write_intermediate
 from .refused import USAGE, Refused, reason
 from .terminal import STDOUT, progress, quiet
@@ -264,6 +265,7 @@ def compare(job: Job) -> None:
     options = job.options
     folder = output(options.output or Path(f"{options.file.stem}_compare"), folder=True)
     untrusted.refuse_inputs([folder / name for name in ("index.html", *PICTURES)])
+    refuse_others(folder, {"index.html": MADE_BY}, PICTURES)
     try:
         with _watched(job, f"Cycles renders the reference, 2 × {options.reference_samples} samples"):
             data = compare_scene(

@@ -33,6 +33,7 @@ MEANINGLESS = {  # (struct, field)
     ("CurveProfile", "changed_timestamp"),
     ("bNodeTree", "inputs"),  # 4.x writes these for older versions from memory that it reuses; the interface follows
     ("bNodeTree", "outputs"),
+    ("Mesh", "face_sets_color_seed"),  # random, of each new mesh; colours that sculpting shows
     ("Object", "base_flag"),  # what is selected, and hidden in viewports
     ("Object", "base_local_view_bits"),
     ("Base", "flag"),

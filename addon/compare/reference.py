@@ -147,6 +147,7 @@ def reference(
     view_layer: bpy.types.ViewLayer | None = None,
     use_cache: bool = True,
     folder: Path | None = None,
+    extra: Sequence[Setting] = (),
 ) -> Reference:
     """The scene by Cycles, twice with `samples` samples and different seeds, from the cache when it was made before.
 
@@ -155,11 +156,11 @@ def reference(
     """
     view_layer = view_layer or active_view_layer(scene)
     folder = (folder or cache_folder()) if use_cache else None
-    key = reference_key(scene, samples, direct_only, size, view_layer) if folder else ""
+    key = reference_key(scene, samples, direct_only, size, view_layer, extra) if folder else ""
     found = cache.load(folder, key) if folder else None
     if found:
         return found
-    made = render_reference(scene, samples, direct_only, size, view_layer, key)
+    made = render_reference(scene, samples, direct_only, size, view_layer, key, extra)
     if folder:
         try:
             cache.save(folder, made)
@@ -168,9 +169,11 @@ def reference(
     return made
 
 
-def render_reference(scene, samples: int, direct_only: bool, size, view_layer, key: str) -> Reference:
-    """The reference without the cache; arguments as in `reference`, all needed. Raises `RenderFailed`."""
-    first, second = (render_passes(scene, "CYCLES", samples, seed, direct_only, size, view_layer) for seed in SEEDS)
+def render_reference(scene, samples: int, direct_only: bool, size, view_layer, key: str, extra=()) -> Reference:
+    """The reference without the cache; arguments as in `reference`. Raises `RenderFailed`."""
+    first, second = (
+        render_passes(scene, "CYCLES", samples, seed, direct_only, size, view_layer, extra=extra) for seed in SEEDS
+    )
     images, half = cache.two_seeds(first.images, second.images)
     return Reference(images, half, samples, first.seconds + second.seconds, first.film_transparent, False, key)
 
@@ -187,9 +190,11 @@ def reference_key(
     direct_only: bool,
     size: tuple[int, int] | None,
     view_layer: bpy.types.ViewLayer,
+    extra: Sequence[Setting] = (),
 ) -> str:
     """Name of the cache entry: a hash of the scene as it will be rendered. Frame, size and samples are part of it."""
-    with overridden(render_settings(scene, view_layer, "CYCLES", samples, 0, 0 if direct_only else None, size)):
+    settings = render_settings(scene, view_layer, "CYCLES", samples, 0, 0 if direct_only else None, size)
+    with overridden([*settings, *extra]):
         view_layer.update()  # evaluation writes into the data (animated values, bounds): always hash what it left
         content = scene_hash(scene)
     about = f"{KEY_VERSION} {SEEDS} {view_layer.name!r} {content}"

@@ -20,6 +20,7 @@ from .first_row import Shown
 from .metrics import EMPTY_DEPTH, PathError, display, figures, is_surface
 from .png import data_url, png
 
+MADE_BY = '<meta name="generator" content="Candela">'  # of page.html
 LARGE_WIDTH = 1920  # pixels; wider pictures are averaged down by a whole factor
 SMALL_WIDTH = 640  # of all rows but the first
 GAINS = {"four": 4.0, "sixteen": 16.0}

@@ -181,11 +181,11 @@ def unit_square() -> geometry.Batch:
     return _kept["square"]
 
 
-def _spectrum(light: str, kelvin: float) -> images.Image:
-    known = f"spectrum {light} {kelvin if light == spectrum.BLACKBODY else ''}"
-    if known not in _kept:
-        _kept[known] = images.upload(spectrum.table(light, kelvin)[None])
-    return _kept[known]
+def _spectrum(light: spectrum.Light) -> images.Image:
+    """Its table, of which that of the last light is kept: temperatures and colours may change from frame to frame."""
+    if _kept.get("light") != light:
+        _kept["light"], _kept["spectrum"] = light, images.upload(spectrum.table(*light)[None])
+    return _kept["spectrum"]
 
 
 @on_release
@@ -219,12 +219,12 @@ def diffract(aperture: images.Image, defocus: float, target: images.Target, *beh
 
 def colour(
     pattern: images.Image, target: images.Target, least: int = 32, most: int = optics.MOST_WAVELENGTHS,
-    light: tuple[str, float] = (spectrum.EQUAL, 0.0),
+    light: spectrum.Light = (spectrum.EQUAL, None),
 ) -> None:  # fmt: skip
     """A light's pattern from that of 575 nm; at least `least` wavelengths each, more further out up to `most`. `light`:
     as spectrum.of_light takes it."""
     passes.fullscreen(
-        COLOURS, target, textures={"pattern": pattern, "spectrum": _spectrum(*light)},
+        COLOURS, target, textures={"pattern": pattern, "spectrum": _spectrum(light)},
         constants={
             "least": least, "most": max(most, least), "usable": optics.usable_radius(pattern.width),
             "fade_from": optics.FADE_FROM, "steps_per_texel": optics.STEPS_PER_TEXEL,
@@ -234,7 +234,7 @@ def colour(
 
 def make_pattern(
     aperture: Aperture, side: int, defocus: float, least: int = 32, most=optics.MOST_WAVELENGTHS,
-    light: tuple[str, float] = (spectrum.EQUAL, 0.0), planes: bool = False,
+    light: spectrum.Light = (spectrum.EQUAL, None), planes: bool = False,
 ) -> Pattern:  # fmt: skip
     """Everything up to the colours. `planes`: what scatters stands in three planes instead of one."""
     fine = SUPERSAMPLING * side

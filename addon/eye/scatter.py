@@ -100,6 +100,18 @@ vec4 reduction_source(ivec2 texel)
     textures=(("RGBA32F", "picture"),),
     constants=_WHITE,
 )
+DAZZLING = reduction.ReductionSource(
+    "light that dazzles",
+    """#include "glare/excess.glsl"
+vec4 reduction_source(ivec2 texel)
+{
+  return vec4(excess_of(picture_fetch(texel).rgb, white, most_light), 0.0);
+}
+""",
+    textures=(("RGBA32F", "picture"),),
+    constants=_WHITE,
+)
+DAZZLES = reduction.block_program(DAZZLING)
 MEASURE, BLOCKS = reduction.block_program(BRIGHTNESS), reduction.BLOCKS
 
 
@@ -121,8 +133,16 @@ def measure(picture: images.Image, white: float) -> Brightness:
     return Brightness(float(mean) / (picture.width * picture.height), float(excess), float(most))
 
 
+def colour(picture: images.Image, white: float) -> tuple[float, float, float]:
+    """Sum of what exceeds white, linear Rec. 709. Waits for the GPU, and copies one texel."""
+    with images.borrowed(1, 1, "RGBA32F") as target:
+        constants = {"white": white, "most_light": MOST_LIGHT}
+        reduction.reduce(DAZZLING, picture.size, target, {"picture": picture}, constants)
+        return tuple(float(channel) for channel in images.read(target.colors[0])[0, 0, :3])
+
+
 def measure_passes(picture: images.Image) -> int:
-    """Passes of `measure`."""
+    """Passes of `measure`, and of `colour`."""
     return reduction.pass_count(picture.size)
 
 

@@ -187,6 +187,7 @@ def between_program(paths: tuple[str, ...], drawn: tuple[str, ...], repeated: bo
             ("WRITE_ALL", " ".join(f"out_{name} = {written[name]};" for name in drawn)),
         ),
         writes_depth=repeated,
+        has_no_use=("surface_edit", "frozen_eyes"),  # light that is known has been turned by edits
         outputs=tuple(("VEC4", f"out_{name}") for name in drawn),
     )
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..frame.light_paths import DIRECT, INDIRECT, LIGHT_PATHS
 from ..snapshot.light_groups import REST, groups_of, is_of, lit_by
-from ..snapshot.scene import Camera, Snapshot
+from ..snapshot.scene import Camera, Film, Snapshot
 from ..snapshot.shutter import Moments
 from . import catcher
 from .resolve import COMBINED
@@ -41,6 +41,7 @@ class Take:
     eye: str
     name: str  # under which slices hold its sums
     group: str  # whose lights light it, where the picture is the sum of several
+    groups: int  # how many those are
     is_plate: bool  # one of the two that shadow catchers need beside the picture
     number: int  # in the list, from 0
     left: int  # takes of the eye that are still to be drawn, with this one
@@ -68,16 +69,28 @@ def takes_of(
             seen = [changed(one if camera is None else replace(one, camera=camera)) for one in scenes]
             if is_plate:  # as one picture, lit by all
                 seen = [replace(one, film=replace(one.film, light_groups=())) for one in seen]
+            if group != groups[0]:
+                seen = [replace(one, film=_light_alone(one.film)) for one in seen]
             own, *others = (lit_by(one, group) for one in seen)
             name = ".".join(part for part in (eye if len(eyes) > 1 else "", name) if part)
             then = moments and replace(moments, snapshots=tuple(others))
-            takes.append(Take(own, then, eye, name, group, is_plate, len(takes), len(shown) - place))
+            takes.append(Take(own, then, eye, name, group, len(groups), is_plate, len(takes), len(shown) - place))
     return takes
+
+
+def _light_alone(film: Film) -> Film:
+    """The film of light groups after the first, which tells all that is no light."""
+    return replace(film, position=False, indices=False, aovs=(), cryptomattes=(), open_within=None)
 
 
 def share_image(group: str, order: str = "") -> str:
     """Name of the image of a light group's share of the picture: of all its light, DIRECT or INDIRECT."""
     return f"{_SHARE}{order} {group}"
+
+
+def is_light(name: str) -> bool:
+    """Whether an image is added up over light groups, of which any other is that of the first."""
+    return name.startswith(("radiance.", COMBINED, GLARE, NOISY, _SHARE))
 
 
 def frame_images(sources: set[str]) -> set[str]:
@@ -108,7 +121,7 @@ class Picture:
         for name, pixels in images.items():
             if name not in self.images:
                 self.images[name] = pixels.copy() if film.light_groups else pixels
-            elif name.startswith(("radiance.", COMBINED, GLARE, NOISY)):
+            elif is_light(name):
                 self.images[name][..., :3] += pixels[..., :3]
                 if is_of(world, take.group, take.snapshot):
                     self.images[name][..., 3:] = pixels[..., 3:]  # glass lets through what of the world is there

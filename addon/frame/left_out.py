@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from ..materials import gloss
 from ..materials.compiled import CompiledMaterial
+from ..materials.nodes.inputs import ROUND
 from ..scene import acceleration
 from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Note, Snapshot
@@ -27,6 +28,7 @@ BRINGS = {
 }
 
 COLOURED = ("instant_radiosity", "multires_radiosity", "clustered_visibility")  # whose rays take colours of layers
+EVEN = ("micro_rendering", "implicit_visibility", "ssdo")  # for which gloss sends light on as dull surfaces do
 GEM = 2.0  # index of refraction, from which on most directions are mirrored totally
 GEM_INTERFACES = 24  # crossings that such glass needs
 WIDE = 0.45  # roughness from which a lobe is about as wide as those of paths (shaders/indirect/albedo.glsl)
@@ -42,6 +44,7 @@ def notes_of(
     return (
         *_for_size(plan, snapshot), *_where_systems_meet(plan, settings), *_bounces_past(plan, tinted),
         *_kept_inside(plan, settings, used), *_thrown_wide(plan, snapshot, settings, materials),
+        *_flat_fibres(plan, snapshot),
     )  # fmt: skip
 
 
@@ -72,8 +75,28 @@ def _thrown_wide(
             names.append(f"'{materials[number].name}'")
     if names:
         told = _together(names if len(names) < 4 else [*names[:2], f"{len(names) - 2} other materials"])
-        text = f"light that other surfaces get from the gloss of {told} is spread as by a roughness of 0.5: lamps'"
-        yield Note("Gloss", f"{text} reflections there are softer. Metals of roughness 0.25 or less throw caustics.")
+        evenly = plan.filled["indirect"] in EVEN
+        spread = "evenly, as by dull surfaces" if evenly else "as by a roughness of 0.5"
+        text = f"light that other surfaces get from the gloss of {told} is spread {spread}: lamps' reflections there"
+        yield Note("Gloss", f"{text} are softer. Metals of roughness 0.25 or less throw caustics.")
+
+
+def _flat_fibres(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:
+    """Principled Hair on meshes in the world's light: its narrow lobes meet directions that all pixels share by chance.
+    Strands show all angles in a few pixels, so that what one gets too much another lacks."""
+    if not plan.runs("environment_light"):
+        return
+    edges = {key: mesh.colors[ROUND] for key, mesh in snapshot.meshes.items() if ROUND in mesh.colors}
+    flat = {key for key, edge in edges.items() if not edge[:, 3].any()}  # strands have a number of sides there
+    shown = {slot for one in snapshot.instances if one.mesh in flat for slot in one.materials}
+    for material in (snapshot.materials[slot] for slot in sorted(shown)):
+        for node in material.graph.nodes.values():
+            if node.type == "ShaderNodeBsdfHairPrincipled":
+                text = (
+                    "where Principled Hair on a mesh is flat, the world's light on it is up to 40 % too bright or too "
+                    "dark, also in many samples. Use hair curves, or lamps."
+                )
+                yield Note(f"Material '{material.name}'", text, material.name, node.label)
 
 
 def _bounces_past(plan: Plan, tinted: Iterable[CompiledMaterial]) -> Iterator[Note]:
@@ -114,9 +137,8 @@ def _where_systems_meet(plan: Plan, settings: Settings) -> Iterator[Note]:
         yield Note("Grass", f"it is missing: {row.reason}.")
     if not plan.runs("shaded_reflections"):
         return
-    air = next((technique for technique in plan.techniques if technique.name == "airlight"), None)
-    if air is not None and min(settings.bounces, settings.get(air, "bounces")) > 0:
-        text = "mirrors and glass show light that volumes scatter once; what they scatter more often is missing there."
+    if plan.runs("airlight") and settings.bounces > 0:
+        text = "surfaces that mirrors and glass show lack the light that volumes scatter onto them."
         yield Note("Volumes", text)
     if plan.runs("volume_caustics"):
         yield Note("Volumes", "mirrors and glass do not show the beams that glass and mirrors throw into volumes.")

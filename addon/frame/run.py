@@ -375,11 +375,7 @@ class Renderer:
         varied = [k for k in shown if lit and self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
         wanted += [self.materials.emission_map_program(k) for k in varied]
-        wanted += [
-            self.materials.tint_program(k)
-            for k in shown
-            if self.materials.compiled[k].tinted or self.materials.compiled[k].added
-        ]
+        wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].colors_behind]
         wanted += [self.materials.layer_program(k) for k in shown if k in self.materials.layers_in_order]
         if not self.materials.layers_in_order:
             wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
@@ -396,7 +392,7 @@ class Renderer:
             volumes_key(snapshot), settings.bounces, settings.schedule.is_draft,
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
-            tuple(one.links for one in snapshot.instances if one.links is not NO_LINKS),
+            tuple(one.links for one in snapshot.instances if one.links != NO_LINKS),
             snapshot.own_values,
         )  # fmt: skip
 
@@ -404,6 +400,7 @@ class Renderer:
     def _content_key(snapshot: Snapshot, settings: Settings, light: tuple) -> tuple:
         return (
             light, snapshot.film, content(snapshot.camera, ("name",)), settings.seed, settings.shows,
+            settings.takes, settings.take,
             settings.schedule.known_total and settings.samples,
             settings.schedule.known_total and (settings.sample_offset, settings.samples_to_draw),
             settings.schedule.known_total and (settings.time_limit, settings.noise_threshold),

@@ -70,6 +70,8 @@ class Settings:
     noise_threshold: float = NOISE_THRESHOLD.default  # the same
     motion_steps: int = MOTION_STEPS.default  # asked of by the engine alone, where motion blur is on
     shows: frozenset[str] | None = None  # images of the frame that are asked for beside the picture; None: any may be
+    takes: int = 1  # light groups whose pictures are added up: together they have the noise of one (film/takes.py)
+    take: int = 0  # number of this one
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):

@@ -106,17 +106,14 @@ class Turns:
         self.drop()
         self._names = tuple(names)
         self._light = tuple(name for name in names if name.startswith("radiance."))
-        settings = frame.settings
-        self._known = (
-            may_rest and settings.schedule.known_total and not settings.may_end_early and frame.numbers is None
-        )
-        self._asks = self._known and settings.samples >= FEWEST_SAMPLES and not _clamped(frame)
+        self._known = may_rest and plans_samples(frame)
+        self._asks = self._known and frame.settings.samples >= FEWEST_SAMPLES and not clamped(frame)
 
     def weight(self, frame: Frame, part: int = 0) -> float:
         """Of a part in this sample; 0: it is not drawn."""
         if self._asks and not frame.is_first and self._weights is None:
             self._decide(frame)
-        if self._weights is None or frame.is_first:
+        if self._weights is None:
             return 1.0
         return self._weights[min(part, len(self._weights) - 1)].get(frame.sample, 0.0)
 
@@ -263,7 +260,14 @@ class Drawing:
         images.Target(tuple(self._own.values())).clear()
 
 
-def _clamped(frame: Frame) -> bool:
+def plans_samples(frame: Frame) -> bool:
+    """Whether it is known from the start how many samples there are, and that all are drawn, so that light of one may
+    stand for that of others."""
+    settings = frame.settings
+    return settings.schedule.known_total and not settings.may_end_early and frame.numbers is None
+
+
+def clamped(frame: Frame) -> bool:
     """Whether single samples are held below a limit, which more weight would reach sooner."""
     film = next((one for one in frame.plan.techniques if one.name == "film"), None)
     return film is not None and any(frame.settings.get(film, name) > 0 for name in ("clamp_direct", "clamp_indirect"))

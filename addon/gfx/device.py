@@ -11,16 +11,18 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import tempfile
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+
+from . import user_folder
 
 VERSION = 3  # of the kernels: figures of others are measured anew
 MOST_KEPT = 16  # drivers
-MOST_BYTES = 1 << 20  # of a file of figures: they are some hundred a driver
+FILE = "candela_devices.json"
 LOAD_GAIN = 0.7  # of a fetch's time, below which loads are worth the bindings that they take
 COMPUTE_GAIN = 0.5  # of a fragment's time, below which compute programs are worth what they wait for
 VARIABLE = "CANDELA_DEVICE"
+OF_PIXELS = ("ray_level", "texel", "fetch", "load", "edge", "fragment", "compute")  # costs that come with each pixel
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,11 @@ class Device:
     edge: float  # of a shadow, asked by a pixel for 64 points of a light
     fragment: float  # of 64 steps of arithmetic of a pixel that is drawn
     compute: float  # the same of a thread of a compute program
+
+    def of_dearer_pixels(self, times: float) -> Device:
+        """The same where each pixel takes so many times as long: a picture of as many times fewer pixels is then drawn
+        in the same ways as one of all."""
+        return replace(self, **{name: times * getattr(self, name) for name in OF_PIXELS})
 
     def lines(self) -> list[str]:
         """For the panel and the terminal."""
@@ -95,7 +102,7 @@ def given() -> Device | None:
         return MADE_UP[name]
     try:
         with Path(name).open(encoding="utf-8") as file:
-            return _of(json.loads(file.read(MOST_BYTES)))
+            return _of(json.loads(file.read(user_folder.MOST_BYTES)))
     except (OSError, ValueError, TypeError, OverflowError, RecursionError) as error:
         names = ", ".join(MADE_UP)
         raise ValueError(f"{VARIABLE} is '{name}': neither one of {names} nor a file of figures ({error}).") from None
@@ -120,45 +127,23 @@ def key() -> str:
 
 def read(folder: Path) -> Device | None:
     """The figures of this driver that were kept; None where there are none that can be read."""
-    return _of_kept(_kept(folder))
-
-
-def _of_kept(kept: dict) -> Device | None:
     try:
-        return _of(kept[key()])
+        return _of(user_folder.kept(folder / FILE)[key()])
     except (KeyError, TypeError, ValueError, OverflowError):
         return None
 
 
-def _kept(folder: Path) -> dict:
-    try:
-        with (folder / "devices.json").open(encoding="utf-8") as file:
-            kept = json.loads(file.read(MOST_BYTES))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return kept if isinstance(kept, dict) else {}
-
-
 def write(folder: Path, device: Device) -> None:
     """Keep the figures of this driver. A folder that cannot be written only means to measure again next time."""
-    kept = {name: one for name, one in _kept(folder).items() if name != key()}
-    kept = dict([*kept.items()][1 - MOST_KEPT :]) | {key(): asdict(device)}
-    with contextlib.suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder, prefix=".writing_")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                json.dump(kept, file, indent=1)
-            Path(temporary).replace(folder / "devices.json")
-        except OSError:
-            Path(temporary).unlink(missing_ok=True)
+    others = {name: one for name, one in user_folder.kept(folder / FILE).items() if name != key()}
+    user_folder.keep(folder / FILE, dict([*others.items()][1 - MOST_KEPT :]) | {key(): asdict(device)})
 
 
 def forget(folder: Path) -> None:
     """Measure anew when figures are next asked for: after a change of clocks, say."""
     use(None)
     with contextlib.suppress(OSError):
-        (folder / "devices.json").unlink(missing_ok=True)
+        (folder / FILE).unlink(missing_ok=True)
 
 
 def _time(nanoseconds: float) -> str:

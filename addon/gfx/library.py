@@ -75,6 +75,7 @@ class Program:
     group: tuple[int, int, int] = (8, 8, 1)
     writes_depth: bool = False  # the fragment shader sets gl_FragDepth
     leaves_out: tuple[tuple[str, str], ...] = ()  # interfaces (gfx/interface.py) that it does not ask, and why
+    has_no_use: tuple[str, ...] = ()  # for images of these names beside those that it reads (gfx/images.py)
 
     def __post_init__(self):
         for kind, name in self.textures:

@@ -215,7 +215,8 @@ def _for_images(program: Program, bindings: dict) -> Shader:
         else:
             return get(program)
     bound = (*read.values(), *blocks.values())
-    beside = {name: image for one in bound for name, image in one.beside.items() if name not in read}
+    known = {*read, *program.has_no_use}
+    beside = {name: image for one in bound for name, image in one.beside.items() if name not in known}
     room = MOST_TEXTURES - len(program.textures)
     if len(beside) > room:  # the first ones are those that can be spared least
         kept = dict(list(beside.items())[: max(room, 0)])

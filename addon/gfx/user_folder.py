@@ -1,12 +1,20 @@
-"""Folder for data that can be made again: the extension's own, or the user's cache folder."""
+"""Folder for data that can be made again: the extension's own, or the user's cache folder; and files of JSON in it.
+
+The folder may be one that the user names and keeps other things in, so that names of files there begin with `candela_`.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 import bpy
+
+MOST_BYTES = 1 << 20  # of a file of JSON
 
 
 def user_folder(name: str) -> Path:
@@ -28,3 +36,27 @@ def user_caches() -> Path:
         return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     given = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return given if given.is_absolute() else Path.home() / ".cache"  # a relative one is to be ignored
+
+
+def kept(path: Path) -> dict:
+    """What a file of JSON holds by name; empty where there is none that can be read."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            found = json.loads(file.read(MOST_BYTES))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def keep(path: Path, content: dict) -> None:
+    """Write such a file at once: whoever reads finds the old content or the new one. Where the folder cannot be written
+    nothing is kept."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".writing_candela_")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                json.dump(content, file, indent=1)
+            Path(temporary).replace(path)
+        except OSError:
+            Path(temporary).unlink(missing_ok=True)

@@ -3,7 +3,7 @@
 0  colour of what passes glass, once; index of refraction
 1  roughness; share of the material that is glass; losses at the interface (0 none but total reflection, 1
    Fresnel's, 2 with multiple scattering given back); whether what is mirrored has the colour, too
-2  what the inside absorbs, 1/m; whether the material is a mirror that passes photons on
+2  what the inside absorbs, 1/m, -1 of clear glass; whether the material is a mirror that passes photons on
 3  and on, two by two as 0 and 1: interfaces that the material has beside (several Glass nodes); share 0: none
 """
 
@@ -17,7 +17,7 @@ from ..frame.picture import Frame
 from ..gfx import images
 from ..materials.compiled import CompiledMaterial
 from ..materials.estimate import Interface
-from ..surfaces.hits import defines_of_absorption
+from ..surfaces.hits import absorbed_inside, defines_of_absorption
 
 
 def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, float] | None = None) -> np.ndarray:
@@ -29,8 +29,7 @@ def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, flo
             losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
             row[place] = *glass.color, glass.ior
             row[place + 1] = glass.roughness, glass.share, losses, glass.mirrors_color
-        if material.medium:
-            row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
+        row[2, :3] = absorbed_inside(material)
         if mirrors and number in mirrors:
             row[2, 3] = 1.0
             if not material.glass:

@@ -1,15 +1,15 @@
 """Light that leaves surfaces below which it scatters, for whoever sees them but the camera: bounces, mirrors, fog.
 
 Once a sample, when somebody asks, walks from each point of the mesh (scene/scatter_points.py) find what leaves there of
-the direct light of all points. With a grid of voxels around each object this stands in one list, an image, so that rays
-find it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. Of
-indirect light they send on what leaves on the side where it came from.
+the direct light of all points; their mean over the samples so far, with a grid of voxels around each object, stands in
+one list, an image, so that rays find it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a
+diffuse surface would send. Of indirect light they send on what leaves on the side where it came from.
 
 | cost | per sample |
 |---|---|
 | rays | a point: `walks` times about 2 / (1 - albedo)^(1/2) + 2 |
 | passes | 2 |
-| bytes | 80 a point, up to 32 for each of 64^3 voxels an instance |
+| bytes | 176 a point, up to 32 for each of 64^3 voxels an instance |
 
 Bias: even over a point's cell; colours and radii are the means of their material; of indirect light what leaves on the
 other side is lost. Burley's method sends as a diffuse surface does: so it does in Cycles.
@@ -33,9 +33,8 @@ from ..scene.view import VIEW
 from ..surfaces.hits import Hits
 from .walked_light import FEW_WALKS
 
-LEAST_WALKS = 4  # of a point in a sample
 WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 5, images.LIST_WIDTH
-LEFT = ("sent", "slope", "part", "same", "lean")
+LEFT = ("sent", "slope", "same", "red", "green", "blue")
 LEAVING = passes.fullscreen_program(
     "light that leaves points",
     "subsurface/leaving.frag.glsl",
@@ -44,13 +43,11 @@ LEAVING = passes.fullscreen_program(
         ("RG32F", "trace_owners"),
         *(("RGBA32F", name) for name in (
             "point_position", "point_normal", "point_instances", "cell_direct", "cell_shapes", "scatter_objects",
-            "scatter_near", "scatter_means", "walk_lobes", "surface_position", "slope_before",
+            "scatter_near", "scatter_means", "walk_lobes", "surface_position",
         )),
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(
-        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size"), ("FLOAT", "newest"),
-    ),
+    constants=(("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size")),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
     outputs=tuple(("VEC4", f"out_{name}") for name in LEFT),
 )  # fmt: skip
@@ -88,12 +85,11 @@ class LeavingLight:
     def __init__(self):
         self.image: images.Image | None = None
         self._rows = 0  # of the image, that points take
-        self._slope: images.Image | None = None  # mean over the samples so far
-        self._samples = 0
+        self._sums: images.Target | None = None  # of LEFT, over the samples so far
 
     def begin(self) -> None:
         """A picture begins."""
-        self._samples = 0
+        self._give()
 
     def update(self, points: ScatterPoints, walked: Any) -> None:
         """Lay out the list for these points. `walked`: numbers of the materials whose light is walked."""
@@ -112,41 +108,35 @@ class LeavingLight:
         hierarchy, settings = frame.hierarchy("shadow"), frame.settings
         owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
         position, normal = points.surface(frame.sample)
-        left = [images.pool.take(ROW, points.rows, "RGBA32F") for _ in LEFT]
+        if self._sums is None:
+            self._sums = images.Target(tuple(images.pool.take(ROW, points.rows, "RGBA32F") for _ in LEFT))
+            self._sums.clear()
         passes.fullscreen(
-            LEAVING, images.Target(tuple(left)),
+            LEAVING, self._sums, blend="ADDITIVE_PREMULT",
             textures={
                 **hierarchy.textures, **textures, "trace_owners": owners, "point_position": position,
                 "point_normal": normal, "point_instances": points.instances, "scatter_objects": points.table,
                 "scatter_near": points.near, "surface_position": frame.images["surface.position"],
-                "slope_before": self._slope if self._samples else position,
             },
             blocks={"film_view": frame.view_block},
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
-                "newest": 1.0 / (self._samples + 1),
-                "walks": 1 if settings.schedule.is_draft else max(FEW_WALKS // settings.samples, LEAST_WALKS),
+                "walks": 1 if settings.schedule.is_draft else max(FEW_WALKS // settings.samples, 1),
             },
         )  # fmt: skip
         passes.fullscreen(
             LIST, images.Target((self.image,)), viewport=(0, 1, WIDTH, self._rows),
             textures={
-                **{f"cell_{name}": image for name, image in zip(LEFT, left)}, "point_position": position,
+                **{f"cell_{name}": image for name, image in zip(LEFT, self._sums.colors)}, "point_position": position,
                 "point_normal": normal,
             },
         )  # fmt: skip
-        self._give()
-        self._samples += 1
-        for name, image in zip(LEFT, left):
-            if name == "slope":
-                self._slope = image
-            else:
-                images.pool.give(image)
 
     def _give(self) -> None:
-        if self._slope is not None:
-            images.pool.give(self._slope)
-        self._slope = None
+        if self._sums is not None:
+            for image in self._sums.colors:
+                images.pool.give(image)
+        self._sums = None
 
     def release(self) -> None:
         """Drop GPU resources."""

@@ -10,7 +10,7 @@ all converges.
 | cost | per sample |
 |---|---|
 | walks | 2 for 16 pixels' surfaces and in each cell, of which one comes on 16 pixels; 4 below FEW samples |
-| passes | 2 for media, 2 for surfaces |
+| passes | 2 for media, 2 for surfaces, 1 for each round of rays that mirrors and glass send on |
 
 Bias: below MANY samples light of several bounces is a mean over cells of up to 16 pixels, and 16 slices.
 """
@@ -18,12 +18,13 @@ Bias: below MANY samples light of several bounces is a mean over cells of up to 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
+from ..gfx.interface import answer
 from ..gfx.library import Program
 from ..scene import acceleration
 from ..scene.media import MEDIA_TEXTURES, Media
@@ -33,6 +34,8 @@ from ..sources.environment import WORLD
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
 from . import froxels
+from .leaving_light import LEAVES
+from .media import RAY_TEXTURES, Rays
 
 MANY = 64  # samples: below, light is found in cells, and at a few surfaces
 WIDE, SMALL = 64, 32  # pixels along the shorter side: in smaller pictures cells were much of what is seen
@@ -98,6 +101,21 @@ def walks_program(start: str, kinds: int, world: bool, shining: bool, once: bool
 
 
 @cache
+def at_hits_program(kinds: int, world: bool, shining: bool, transmission: bool) -> Program:
+    """Walks from rays that mirrors and glass send on."""
+    seen = walks_program(PIXELS, kinds, world, shining, False)
+    paths = ("glossy", "transmission") if transmission else ("glossy",)
+    return replace(
+        seen,
+        name="walks in media from rays of lobes",
+        textures=tuple(dict.fromkeys((*seen.textures, *RAY_TEXTURES, ("RGBA32F", "met_path")))),
+        constants=(*seen.constants, ("INT", "ray_number")),
+        defines=(*seen.defines, ("AT_HITS", "1"), *((("TRANSMISSION", "1"),) if transmission else ())),
+        outputs=tuple(("VEC4", f"out_{path}_{order}") for path in paths for order in ("direct", "indirect")),
+    )
+
+
+@cache
 def cells_program(shining: bool) -> Program:
     """Brings the light of the grid to all pixels."""
     return passes.fullscreen_program(
@@ -133,6 +151,7 @@ def surfaces_program(shining: bool) -> Program:
 DECLARED = (
     *(walks_program(start, -1, start == CELLS, start != PIXELS, start == ON_SURFACES) for start in START),
     *(walks_program(start, -1, False, True, False, True) for start in (PIXELS, CELLS)),
+    *(at_hits_program(-1, True, shining, True) for shining in (False, True)),
     *(program(shining) for program in (cells_program, surfaces_program) for shining in (False, True)),
 )
 
@@ -160,7 +179,7 @@ class MediaBounces:
             return
         names = _names("volume", media.emits)[0 if bounces else 1 :]
         program = walks_program(PIXELS, lit.kinds, lit.world, media.emits, False, not bounces)
-        bound = self._bound(frame, lit, program)
+        program, bound = self._bound(frame, lit, program)
         constants = asked | {
             "shown_pixel": (0, 0),
             "stride": 1,
@@ -173,6 +192,26 @@ class MediaBounces:
         for band in frame.bands(technique, names[0]):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, constants=constants, **bound)
             yield
+        frame.count(technique, "passes")
+
+    def on_rays(
+        self, frame: Frame, technique: Technique, media: Media, lit: Lit, asked: dict[str, object], bounces: int,
+        rays: Rays, target: images.Target,
+    ) -> None:  # fmt: skip
+        """Add what media send back along `rays` after other bounces, in a sample whose own walks have been taken."""
+        program = at_hits_program(lit.kinds, lit.world, media.emits, rays.transmission)
+        program, bound = self._bound(frame, lit, program)
+        bound["textures"] |= rays.textures
+        constants = {
+            "shown_pixel": (0, 0),
+            "stride": 1,
+            "is_spread": 0,
+            "walks": 1,
+            "bounces": bounces,
+            "scatters": EVERY,
+        }
+        constants |= asked | {"ray_number": rays.number}
+        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=rays.where, constants=constants, **bound)
         frame.count(technique, "passes")
 
     def _in_cells(self, frame, technique, media, lit, asked, bounces) -> Iterator[None]:
@@ -189,9 +228,8 @@ class MediaBounces:
             "bounces": max(bounces, 1),
             "scatters": EVERY,
         }
-        passes.fullscreen(
-            program, images.Target(found), constants=constants, **self._bound(frame, lit, program)
-        )  # fmt: skip
+        program, bound = self._bound(frame, lit, program)
+        passes.fullscreen(program, images.Target(found), constants=constants, **bound)
         yield
         passes.fullscreen(
             cells_program(both), frame.target(*_names("volume", media.emits)[0 if bounces else 1 :]),
@@ -211,7 +249,7 @@ class MediaBounces:
     def _onto_surfaces(self, frame, technique, media, lit, asked, scatters, spread) -> Iterator[None]:
         names = _names("diffuse", media.emits)
         program = walks_program(ON_SURFACES, lit.kinds, lit.world, media.emits, scatters == 1)
-        bound = self._bound(frame, lit, program)
+        program, bound = self._bound(frame, lit, program)
         constants = asked | {
             "is_spread": int(spread), "walks": self._walks if spread else 1, "scatters": scatters,
             "bounces": min(frame.settings.bounces, MOST_STEPS),
@@ -242,12 +280,12 @@ class MediaBounces:
         frame.count(technique, "passes", 2)
         yield
 
-    def _bound(self, frame: Frame, lit: Lit, program: Program) -> dict[str, dict]:
+    def _bound(self, frame: Frame, lit: Lit, program: Program) -> tuple[Program, dict[str, dict]]:
+        """The program for what the frame has, and what it is drawn with."""
         textures = lit.textures | surface_bindings(frame) | {"reflectance": self._reflectance.image}
         read = {name for _, name in program.textures}
-        return {
-            "textures": {name: image for name, image in textures.items() if name in read}, "blocks": lit.blocks,
-        }  # fmt: skip
+        textures = {name: image for name, image in textures.items() if name in read}
+        return answer(frame, program, textures, (LEAVES,)), {"textures": textures, "blocks": lit.blocks}
 
     def release(self) -> None:
         self._reflectance.release()

@@ -330,17 +330,18 @@ class Photons:
         """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next.
         `on_gloss`: glossy lobes may take those that clear glass lets pass."""
         target = self._target("_found", light.view.side, len(FOUND))
-        if self._patterned:
+        patterned = self._patterned and REFRACTED in light.lobes
+        if patterned:
             behind = self._behind.farthest(frame, technique, light.view, casters.refracting)
         for block, bound in self._drawn(frame, technique, casters, light, interfaces):
             textures = {
                 **frame.hierarchy("transmission").textures, **bound["textures"],
                 "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
             }  # fmt: skip
-            if self._patterned:
+            if patterned:
                 textures |= {name: behind[name] for name in ("behind_position", "behind_tint")}
             passes.fullscreen(
-                asked(frame, photons_program(self._patterned), textures),
+                asked(frame, photons_program(patterned), textures),
                 target,
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},

@@ -201,9 +201,11 @@ class VirtualLights:
         candidates = grid.count * grid.rays
         choice = Choice(grid.rays, candidates, seen_middle(frame))
         views = probes.find(frame, grid.probes, self.path_bindings(frame))
-        found = self._candidates(frame, grid, views)
-        held = [*views.values(), *found.values()]
+        held = [*views.values()]
         try:
+            yield  # what finds probes and what traces from them are several programs each
+            found = self._candidates(frame, grid, views)
+            held += found.values()
             yield
             order = choice.order(found["candidate_point"], found["candidate_normal"])
             yield

@@ -5,11 +5,12 @@
 The interface, albedo inversion and free paths are those of Cycles; anisotropy is taken up by similarity. A walk goes
 through the hierarchy of triangles, in the object that it entered alone. Light where it leaves is that of the nearest
 point of the mesh (scene/scatter_points.py), which is lit by all that lights points; what leaves within the window of
-pixels on the same side, by the mean over those (subsurface/gather.frag.glsl).
+pixels on the same side and faces the viewer, by the mean over those (subsurface/gather.frag.glsl).
 
 | cost | per sample |
 |---|---|
 | rays | a pixel: `walks` times about 2 / (1 - albedo)^(1/2) + 2, none longer than 12 free paths |
+| walks | a pixel: 8 over the samples, at least 1; up to 8 where it is wider than half a free path |
 | bytes per pixel | 48 while it runs |
 
 Bias: light where walks leave is even within a point's cell; after 64 steps the rest leaves by diffusion.
@@ -25,7 +26,7 @@ from ..scene.scatter_points import RANGE, ScatterPoints
 from ..scene.view import VIEW
 from ..surfaces.hits import Hits
 
-FEW_WALKS = 8  # of a pixel, in a picture of one sample
+FEW_WALKS = 8  # of a pixel, in a picture of one sample, and of small pictures in each
 NAMES = ("direct", "indirect", "near")
 PICTURE = ("surface_position", "surface_normal", "spread_length", "scatter_share", "spread_entry", "scatter_walk")
 WALK = passes.fullscreen_program(
@@ -39,7 +40,10 @@ WALK = passes.fullscreen_program(
         )),
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size")),
+    constants=(
+        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "most_walks"),
+        ("FLOAT", "offset_size"),
+    ),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
     outputs=tuple(("VEC4", f"out_{name}") for name in NAMES),
 )  # fmt: skip
@@ -54,16 +58,18 @@ SMOOTH = passes.fullscreen_program(
         )
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "first_object"), ("FLOAT", "narrowness")),
-    defines=(("RANGE", str(RANGE)),),
+    constants=(("INT", "first_object"), ("INT", "walks"), ("INT", "most_walks"), ("INT", "samples")),
+    defines=(("RANGE", str(RANGE)), ("FEW_WALKS", str(FEW_WALKS))),
     outputs=tuple(("VEC4", f"out_{name}") for name in NAMES),
 )  # fmt: skip
 PROGRAMS = (WALK, SMOOTH)
 
 
-def walks_of(frame: Frame) -> int:
-    """Of a pixel in a sample."""
-    return 1 if frame.settings.schedule.is_draft else max(FEW_WALKS // frame.settings.samples, 1)
+def walks_of(frame: Frame) -> dict[str, int]:
+    """Of a pixel in a sample, at least and at most: small pictures have more (subsurface/walked.glsl)."""
+    if frame.settings.schedule.is_draft:
+        return {"walks": 1, "most_walks": 1}
+    return {"walks": max(FEW_WALKS // frame.settings.samples, 1), "most_walks": FEW_WALKS}
 
 
 def walk(
@@ -87,8 +93,8 @@ def walk(
         },
         blocks={"film_view": frame.view_block},
         constants={
-            "first_object": points.first_object, "first_leaf": first_leaf, "walks": walks_of(frame),
-            "offset_size": frame.offset_size,
+            "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
+            **walks_of(frame),
         },
     )  # fmt: skip
     smooth = [images.pool.take(*size, "RGBA32F") for _ in NAMES]
@@ -100,8 +106,7 @@ def walk(
         },
         blocks={"film_view": frame.view_block},
         constants={
-            "first_object": points.first_object,
-            "narrowness": (max(frame.settings.samples, FEW_WALKS) / FEW_WALKS) ** -0.25,
+            "first_object": points.first_object, "samples": frame.settings.samples, **walks_of(frame),
         },
     )  # fmt: skip
     for image in made:

@@ -85,7 +85,15 @@ class CompiledMaterial:
     averaging: frozenset[str] = frozenset()  # those of `images` of which some lookup averages (averages.py)
     own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # where `tinted`: mean colour of what passes, over its luminance
+    coated: bool = False  # a Principled BSDF of it may have a coat
+    strands: bool = False  # tubes of hair show it: programs that draw meshes know them (surface/strand.glsl)
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # about what it reflects, on average: for first looks
+
+    @property
+    def colors_behind(self) -> bool:
+        """Whether layers of it are drawn once more, to colour what lies behind them."""
+        some = self.transparent and (self.opacity > 0.0 or self.uneven)
+        return self.tinted or self.added or (some and not (self.diffuse or self.glossy))
 
     @property
     def bounds_alone(self) -> bool:

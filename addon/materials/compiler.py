@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from . import nodes
+from . import gloss, nodes
 from .attributes import surroundings_of
 from .bounds import Bounds
 from .compiled import CompiledMaterial
@@ -98,6 +98,7 @@ class _Compilation:
             tint=_tint_of(passes.mean),
             glows=transparent and emissive,
             added=transparent and self._adds_lobes_to_transparency(),
+            coated=gloss.coated(self.graph),
             glass=summary.glass,
             medium=medium,
             scatter=summary.scatter,

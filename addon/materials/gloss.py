@@ -42,6 +42,12 @@ def polish(graph: Graph) -> Iterator[float]:
             yield value(node, "Coat Roughness", 1.0) if value(node, "Coat Weight") >= 0.5 else 1.0
 
 
+def coated(graph: Graph) -> bool:
+    """Whether a Principled BSDF of the tree may have a coat."""
+    nodes = (node for node in graph.nodes.values() if node.type == "ShaderNodeBsdfPrincipled")
+    return any(value(node, "Coat Weight", 1.0) > 0.0 for node in nodes)
+
+
 def patterned(graph: Graph) -> bool:
     """Whether the colour of glass is more than a socket's own value."""
     sockets = [

@@ -8,10 +8,26 @@ that lies furthest along the normals (the local linear envelope of Cycles' shado
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
+
+from ..snapshot.scene import Mesh
 
 NOISE = 4e-6  # of a triangle's size, below which float32 says nothing
 AT_ONCE = 1 << 16  # triangles, so that what is computed of them stays in the cache
+
+
+def corner_shapes(meshes: Iterable[Mesh], places: np.ndarray, normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(C, 2) float32 the attribute `envelope` of the corners of all `meshes`, in their order: of strands what
+    shaders/surface/strand.glsl reads, in place of what normal_envelope says."""
+    out, first = normal_envelope(places, normals, triangles), 0
+    for mesh in meshes:
+        end = first + len(mesh.corner_vertices)
+        if mesh.strands is not None:
+            out[first:end] = mesh.strands[mesh.corner_vertices]
+        first = end
+    return out
 
 
 def normal_envelope(places: np.ndarray, normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:

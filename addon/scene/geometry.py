@@ -23,7 +23,7 @@ from ..snapshot.scene import Instance, Mesh, Snapshot
 from . import casters
 from .corners import corner_attribute
 from .culling import Boxes, closed
-from .envelope import normal_envelope
+from .envelope import corner_shapes
 from .shells import prisms
 
 LARGE, STEPS = 256.0, 16  # m: scenes beyond it are cut into so many places for the origin
@@ -455,7 +455,7 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
     surface_vertices = gfx_geometry.vertex_buffer(
         position=places,
         normal=normals,
-        envelope=normal_envelope(places, normals, corners),
+        envelope=corner_shapes((mesh for _, mesh, _ in parts), places, normals, corners),
         local_instance=np.concatenate([np.full(len(mesh.corner_vertices), k, np.int32) for k, mesh, _ in parts]),
     )
     surfaces = []

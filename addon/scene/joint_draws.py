@@ -30,7 +30,7 @@ from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance
 from .casters import chunks
 from .culling import Boxes, joined
-from .envelope import normal_envelope
+from .envelope import corner_shapes
 from .geometry import SceneGeometry
 from .materials import MaterialSet, may_share
 
@@ -157,7 +157,7 @@ def _made(geometry: SceneGeometry, materials: MaterialSet, together: list[bool])
         places = mesh.positions[mesh.corner_vertices]
         corners["position"].append(np.tile(places, (count, 1)))
         corners["normal"].append(np.tile(mesh.corner_normals, (count, 1)))
-        envelope = normal_envelope(places, mesh.corner_normals, mesh.triangle_corners)
+        envelope = corner_shapes((mesh,), places, mesh.corner_normals, mesh.triangle_corners)
         corners["envelope"].append(np.tile(envelope, (count, 1)))
         corners["local_instance"].append((numbers[:, None] + base[None]).reshape(-1))
         for leader in np.unique(leaders[of_triangle[joins[of_triangle]]]).tolist():

@@ -80,14 +80,16 @@ class MaterialSet:
             self._energy_space = current().name
         before = self.compiled
         cache, self.compiled, notes, self.own_images = {}, [], [], {}
-        for material in snapshot.materials:
+        of_strands = _on_strands(snapshot)
+        for k, material in enumerate(snapshot.materials):
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)
             by_map = uv_placed.asks(material.own)
-            key = material.graph, versions, current().name, by_map
+            key = material.graph, versions, current().name, by_map, k in of_strands
             if cached is None or cached[0] != key:
                 lean = to_hold(True, False)
                 compiled = compile_material(material.name, material.graph, snapshot.images, lean=lean)
+                compiled = replace(compiled, strands=k in of_strands)
                 cached = key, uv_placed.with_map(compiled) if by_map else compiled
             cache[material.key] = cached
             compiled = cached[1]
@@ -128,7 +130,7 @@ class MaterialSet:
         for k, compiled in enumerate(self.compiled):
             if not may_share(compiled):
                 continue
-            key = (compiled.program_key, compiled.glows, compiled.added)
+            key = (compiled.program_key, compiled.strands, *_layer_defines(compiled))
             leader = open_groups.setdefault(key, k)
             used = sum(map(len, rows.get(leader, ())))
             if used + len(compiled.values) > SHARED_ROWS:
@@ -175,7 +177,7 @@ class MaterialSet:
         """Materials whose layers are taken apart, so that what one emits has the colours of those before it: all that
         emit or are coloured, where there are both."""
         glowing = {k for k, one in enumerate(self.compiled) if one.glows}
-        colored = {k for k, one in enumerate(self.compiled) if one.tinted or one.added}
+        colored = {k for k, one in enumerate(self.compiled) if one.colors_behind}
         return frozenset(glowing | colored) if glowing and colored else frozenset()
 
     @property
@@ -279,6 +281,13 @@ def _version(snapshot: Snapshot, name: str) -> int | tuple[int, ...]:
     return versions if len(versions) > 1 else versions[0]
 
 
+def _on_strands(snapshot: Snapshot) -> frozenset[int]:
+    """Materials of objects that are hair."""
+    hair = {key for key, mesh in snapshot.meshes.items() if mesh.strands is not None}
+    shown = (one.materials for one in snapshot.instances if one.mesh in hair) if hair else ()
+    return frozenset(k for materials in shown for k in materials)
+
+
 def may_share(compiled: CompiledMaterial) -> bool:
     """Whether a material can be drawn together with others of its program: it binds nothing of its own but values."""
     alone = compiled.images or compiled.attributes or compiled.own_surface
@@ -307,7 +316,8 @@ def _struct(length: int) -> Struct:
     return _structs.setdefault(length, Struct("MaterialValues", ("vec4", f"value[{length}]")))
 
 
-def _shared(compiled: CompiledMaterial) -> dict:
+def _shared(compiled: CompiledMaterial, is_camera: bool = False) -> dict:
+    """`is_camera`: of programs that draw what the camera sees."""
     count, own = len(compiled.attributes), compiled.own_surface
     copy = "".join(f"  varying_attribute{k} = attribute{k};\n" for k in range(count))
     head = "void fill_attributes(inout SurfacePoint point, vec2 steps_x, vec2 steps_y)"
@@ -338,6 +348,7 @@ def _shared(compiled: CompiledMaterial) -> dict:
         "writes_depth": own is not None,
         "snippets": (
             ("generated/own_surface", own.glsl if own else ""),
+            ("generated/strands", STRANDS * compiled.strands + WIDE * bool(is_camera and _strand_defines(compiled))),
             ("generated/attributes", f"void copy_attributes()\n{{\n{copy}}}\n"),
             (
                 "generated/material",
@@ -384,9 +395,9 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
         ),
         defines=(
             *CAMERA_DEFINES, *AVERAGING_DEFINES, *_layer_defines(compiled),
-            *((("MATERIAL_BASE", "(instance_flat.y >> 1)"),) if shares else ()),
+            *((("MATERIAL_BASE", "(instance_flat.y >> 1)"),) if shares else ()), *_strand_defines(compiled),
         ),
-        **_shared(compiled),
+        **_shared(compiled, True),
     )  # fmt: skip
 
 
@@ -403,7 +414,18 @@ def _lobe_program(compiled: CompiledMaterial) -> Program:
 
 def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
     """How layers of a material are drawn, see surface.frag.glsl."""
-    return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added + _own_defines(compiled)
+    kinds = {"GLOWS": compiled.glows, "ADDED_LOBES": compiled.added, "LAYER_COLORS": compiled.colors_behind}
+    return tuple((name, "") for name, is_so in kinds.items() if is_so) + _own_defines(compiled)
+
+
+STRANDS, WIDE = "#define STRANDS\n", '#include "surface/strand.glsl"\n'
+
+
+def _strand_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
+    """Whether a material has strands that may be drawn wider than they are (surface/strand.glsl): not where layers
+    before and behind one another add up. What no strand shows pays nothing for them."""
+    layered = compiled.transparent or compiled.glows or compiled.colors_behind or compiled.own_surface
+    return () if layered or not compiled.strands else (("WIDENS_STRANDS", ""),)
 
 
 EYE = "vec4(film_view.eye.xyz, 1.0 - film_view.eye.w)"
@@ -413,6 +435,9 @@ def _own_defines(compiled: CompiledMaterial, rays_begin: str = EYE) -> tuple[tup
     """Whether programs look for the surface themselves, see surface/point.glsl; `rays_begin`: a place, w 1, or a
     direction to infinity, w 0."""
     return (("OWN_SURFACE", ""), ("RAYS_BEGIN", rays_begin)) if compiled.own_surface else ()
+
+
+BEFORE_CONSTANTS = (("INT", "first_instance"), ("INT", "glass_bends"))  # of programs that draw before known surfaces
 
 
 @_once
@@ -427,7 +452,7 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
             (_struct(len(compiled.values)), "material_values"),
             (MATERIAL_SCENE, "material_scene"),
         ),
-        constants=(("INT", "first_instance"), ("INT", "glass_bends")),
+        constants=(*BEFORE_CONSTANTS, ("INT", "transparent_mode")),
         defines=(*CAMERA_DEFINES, *AVERAGING_DEFINES, *_layer_defines(compiled)),
         **{**shared, "textures": (*shared["textures"], ("RGBA32F", "surface_position"))},
     )
@@ -444,8 +469,16 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
         name=f"subsurface {compiled.program_key[:8]}",
         fragment="surface/scatter.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SCATTER_IMAGES),
+        constants=BEFORE_CONSTANTS,
         textures=(*like.textures, ("RGBA32F", "scatter_objects")),
-        defines=(*CAMERA_DEFINES, *AVERAGING_DEFINES, ("SUBSURFACE", "1"), *_own_defines(compiled)),
+        snippets=_shared(compiled, True)["snippets"],
+        defines=(
+            *CAMERA_DEFINES,
+            *AVERAGING_DEFINES,
+            ("SUBSURFACE", "1"),
+            *_own_defines(compiled),
+            *_strand_defines(compiled),
+        ),
     )
 
 
@@ -460,7 +493,7 @@ def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
         if len(_aov_programs) >= MOST_DECLARED:
             _aov_programs.clear()
         layered = (("LAYERED", "1"),) * compiled.transparent
-        shared = _shared(compiled)
+        shared = _shared(compiled, True)
         moving = any(kind == "VECTOR" for held in layout for _, kind in held)
         program = Program(
             name=f"AOVs {compiled.program_key[:8]}",
@@ -472,7 +505,13 @@ def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
                 (MATERIAL_SCENE, "material_scene"),
             ),
             constants=(("INT", "first_instance"), ("INT", "layers"), ("FLOAT", "alpha_threshold")),
-            defines=(*CAMERA_DEFINES, *layered, *((("MOTION", "1"),) if moving else ()), *_own_defines(compiled)),
+            defines=(
+                *CAMERA_DEFINES,
+                *layered,
+                *((("MOTION", "1"),) if moving else ()),
+                *_own_defines(compiled),
+                *_strand_defines(compiled),
+            ),
             **{
                 **shared,
                 "textures": (
@@ -520,6 +559,7 @@ def _glow_program(compiled: CompiledMaterial) -> Program:
         name=f"glow {compiled.program_key[:8]}",
         fragment="surface/glow.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
+        constants=BEFORE_CONSTANTS,
         defines=(*CAMERA_DEFINES, *AVERAGING_DEFINES, *_own_defines(compiled)),
     )
 

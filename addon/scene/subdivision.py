@@ -13,7 +13,8 @@ from ..snapshot.scene import Mesh
 def subdivided(mesh: Mesh) -> Mesh:
     """The mesh with each triangle cut into four at the middles of its edges, which neighbours share: it stays closed.
     What corners and vertices hold is interpolated. Pieces of flat faces count as smooth; their normals stay the face's
-    until vertices are moved. Key and version are the mesh's own."""
+    until vertices are moved. Key and version are the mesh's own.
+    Tubes of hair lose what they are."""
     corners = mesh.triangle_corners
     ends = mesh.corner_vertices[corners]
     sides = np.stack([ends, np.roll(ends, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -51,4 +52,5 @@ def subdivided(mesh: Mesh) -> Mesh:
         generated=of_vertices(mesh.generated),
         motion=None if mesh.motion is None else tuple(of_vertices(one) for one in mesh.motion),
         velocity=of_vertices(mesh.velocity),
+        strands=None,
     )

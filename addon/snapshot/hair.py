@@ -78,10 +78,7 @@ def read_hair(hair: HairSystem) -> Strands:
     system, owner = hair.modifier.particle_system, hair.owner
     settings = system.settings
     first, end = _strands(system, hair.final)
-    steps = settings.render_step if hair.final else settings.display_step
-    count = (1 << min(max(steps, 0), MOST_STEPS)) + 1
-    if settings.kink == "SPIRAL":
-        count += settings.kink_extra_steps
+    count = _points_a_strand(hair)
     ask = system.co_hair
     rows = (ask(owner, particle_no=strand, step=step) for strand in range(first, end) for step in range(count))
     points = np.fromiter(chain.from_iterable(rows), np.float64, (end - first) * count * 3).reshape(-1, count, 3)
@@ -94,6 +91,19 @@ def read_hair(hair: HairSystem) -> Strands:
         points.reshape(-1, 3).astype(np.float32), _radii(points, settings).reshape(-1).astype(np.float32),
         np.arange(len(points) + 1) * count, uv_maps, active, _generated(owner.data, points[:, 0]),
     )  # fmt: skip
+
+
+def point_count(hair: HairSystem) -> int:
+    """Points of all strands, without reading them."""
+    first, end = _strands(hair.modifier.particle_system, hair.final)
+    return (end - first) * _points_a_strand(hair)
+
+
+def _points_a_strand(hair: HairSystem) -> int:
+    settings = hair.modifier.particle_system.settings
+    steps = settings.render_step if hair.final else settings.display_step
+    count = (1 << min(max(steps, 0), MOST_STEPS)) + 1
+    return count + settings.kink_extra_steps if settings.kink == "SPIRAL" else count
 
 
 def _strands(system, final: bool) -> tuple[int, int]:

@@ -20,7 +20,17 @@ from .cache import next_version
 from .hair import HairSystem, read_hair
 from .scene import Mesh, Note
 from .shape import corner_numbers, island_numbers, pointiness
-from .strands import HAIR_RADIUS, POINT_RADIUS, between, point_facts, spheres, strand_facts, strand_places, tubes
+from .strands import (
+    HAIR_RADIUS,
+    POINT_RADIUS,
+    between,
+    point_facts,
+    spheres,
+    strand_facts,
+    strand_places,
+    strand_shape,
+    tubes,
+)
 from .tangents import corner_tangents
 
 # Metres. Beyond it the squared length of a position overflows float32 on the GPU; such a vertex is as broken as NaN.
@@ -68,6 +78,7 @@ class RawMesh:
     generated: np.ndarray | None = None  # (V, 3) float32
     flat: bool = False  # no face is smooth
     velocity: np.ndarray | None = None  # (V, 3) float32, m/s
+    strands: np.ndarray | None = None  # (V, 2) float32, see strands.strand_shape
 
     def digest(self) -> bytes:
         """128 bits over everything that `build_mesh` uses; equal digests mean equal content."""
@@ -75,7 +86,9 @@ class RawMesh:
         head = (self.slots, self.flat, self.active_uv, self.active_color, tuple(self.uv_maps), tuple(self.colors))
         state.update(repr((head, len(self.positions), len(self.corner_vertices), len(self.face_starts))).encode())
         arrays = [self.positions, self.corner_vertices, self.corner_normals, self.face_starts]
-        arrays += [array for array in (self.face_slots, self.generated, self.velocity) if array is not None]
+        arrays += [
+            array for array in (self.face_slots, self.generated, self.velocity, self.strands) if array is not None
+        ]
         for array in [*arrays, *self.uv_maps.values(), *self.colors.values()]:
             state.update(array.data if array.size else b"")
         return state.digest()
@@ -181,6 +194,7 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
     return RawMesh(
         positions, corners, normals[corners], np.arange(0, len(corners), 3, dtype=np.int32), None, slots=1,
         uv_maps=uv_maps, active_uv=next(iter(uv_maps), ""), colors=colors, generated=generated, velocity=velocity,
+        strands=strand_shape((positions, normals, triangles, source), points, radii, offsets) if hair else None,
     )  # fmt: skip
 
 
@@ -206,6 +220,7 @@ def _read_particle_hair(system: HairSystem, wanted: Wanted) -> RawMesh:
         uv_maps={name: np.ascontiguousarray(values[curve[corners]]) for name, values in strands.uv_maps.items()},
         active_uv=strands.active_uv, colors=_facts(wanted, facts, corners),
         generated=np.ascontiguousarray(strands.generated[curve]),
+        strands=strand_shape((positions, normals, triangles, source), strands.points, strands.radii, strands.offsets),
     )  # fmt: skip
 
 
@@ -250,6 +265,7 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
         tangents=tangents,
         generated=raw.generated,
         velocity=raw.velocity,
+        strands=raw.strands,
         bounds_min=low,
         bounds_max=high,
     )

@@ -67,6 +67,7 @@ class Mesh:
     shells: tuple[tuple[int, int], ...] = ()
     motion: tuple[np.ndarray, np.ndarray] | None = None  # (V, 3) each: to where vertices were a frame ago, and will be
     velocity: np.ndarray | None = None  # (V, 3) float32 m/s, of fluids and caches: stands for motion between frames
+    strands: np.ndarray | None = None  # (V, 2) float32, of tubes that stand for hair: see strands.strand_shape
 
     @property
     def triangle_count(self) -> int:

@@ -2,14 +2,17 @@
 
 Cycles draws hair as ribbons that face the viewer with the normals of a tube, along a Catmull-Rom spline through the
 points, and point clouds as spheres. Here both become meshes, so that every technique sees them like any other. A tube
-is a little wider than the hair (its mean width over all directions, perimeter / pi by Cauchy, is the hair's): of twelve
-sides, where hairs are few, by .977 to 1.011 as it is turned, of four by .785 to 1.11. A sphere of triangles is a little
-larger (its mean shadow, area / 4, is the sphere's); normals are the round ones.
+is a little wider than the hair: its mean width over all directions, perimeter / pi by Cauchy, is the hair's. As it is
+turned, its width is .977 to 1.011 of that with twelve sides, where hairs are few, .990 to 1.005 with nine, .983 to
+1.008 with seven, .967 to 1.017 with five: odd numbers, since the width of a polygon of n sides varies no more than
+that of one of 2 n where n is odd. Tubes of fewer than ten sides are turned each by itself, so that hairs side by side
+have the mean width from every side. A sphere of triangles is a little larger (its mean shadow, area / 4, is the
+sphere's); normals are the round ones.
 
 Bias: a facet that turns away from a lamp shadows a rim that a round strand would light, 1 to 2 % of a tuft's light.
 
 Bulk numpy; the only loop runs along the points of the longest curve, for all curves at once. 10,000 hairs of 8 points
-are 1.1 million triangles and take 0.4 s. Of more the tubes become coarser: one piece a segment, then three sides, then
+are 1.4 million triangles and take 0.5 s. Of more the tubes become coarser: one piece a segment, then three sides, then
 every other point.
 """
 
@@ -21,13 +24,16 @@ import numpy as np
 
 from ..materials.nodes.inputs import MARK, PLACE, ROUND, STRAND, WAY
 
-SIDES = 4
+SIDES = 5
 STEPS = 2  # pieces per segment of the spline, as many as Cycles draws by default
 FINENESS = ((STEPS, SIDES), (1, SIDES), (1, 3))  # pieces and sides: the first that is not too much
-ROUND_SIDES = 12, 8, 6  # sides before those: the first that makes no more than
+ROUND_SIDES = 12, 9, 7  # sides before those: the first that makes no more than
 FEW_TRIANGLES = 300_000  # of them
 HAIR_RADIUS = 0.005  # metres, where a curve or point has none: Cycles' defaults
 POINT_RADIUS = 0.01
+TURNED = 10  # sides, from which on all tubes may be turned alike
+GOLDEN = (5**0.5 - 1) / 2  # whose multiples fill a turn evenly, however many there are
+AXIS_STEPS = 1024  # of a strand's direction: .1 degrees
 MOST_TRIANGLES = 1_500_000  # of a point cloud or of hair, before its spheres or tubes become coarser
 
 
@@ -84,9 +90,10 @@ def _tubes(points: np.ndarray, radii: np.ndarray, offsets: np.ndarray, pieces: i
     if not len(ring_place):
         return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), ring_point
     u, v = _frames(ring_place, ring_curve)
-    angle = 2.0 * np.pi * np.arange(sides) / sides
+    turn = ring_curve * GOLDEN % 1.0 if sides < TURNED else np.zeros(len(ring_curve))
+    angle = 2.0 * np.pi / sides * (np.arange(sides) + turn[:, None])
     wider = np.pi / (sides * np.sin(np.pi / sides))  # circumradius of a polygon whose perimeter is the circle's
-    normals = np.cos(angle)[None, :, None] * u[:, None] + np.sin(angle)[None, :, None] * v[:, None]
+    normals = np.cos(angle)[:, :, None] * u[:, None] + np.sin(angle)[:, :, None] * v[:, None]
     positions = ring_place[:, None] + normals * (wider * ring_width)[:, None, None]
     ring = np.flatnonzero(ring_curve[:-1] == ring_curve[1:])
     side = np.arange(sides)
@@ -183,7 +190,7 @@ def strand_places(
     positions: np.ndarray, source: np.ndarray, points: np.ndarray, offsets: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Between which points (V,), (V,) of their strands the vertices (V, 3) of tubes lie, and the share (V,) of the way.
-    `source` (V,): the nearest point."""
+    `source` (V,): the nearest point; where points are not finite, the vertices lie at it."""
     curve = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     first, last, number = offsets[curve], offsets[curve + 1] - 1, np.arange(len(points))
     onward = points[np.minimum(number + 1, last)] - points[number]
@@ -195,7 +202,7 @@ def strand_places(
 
     ahead, behind = share(onward[source]), share(back[source])
     place = source + np.where(ahead > 0, np.clip(ahead, 0.0, 0.5), np.clip(behind, -0.5, 0.0))
-    place = np.clip(place, first[source], last[source])
+    place = np.clip(np.where(np.isnan(place), source, place), first[source], last[source])
     low = np.floor(place).astype(int)
     return low, np.minimum(low + 1, last[source]), place - low
 
@@ -218,9 +225,8 @@ def strand_facts(
     strand's direction and a random number. ROUND (V, 4): how far the vertex lies off the strand's axis, in radii, and
     the tube's sides.
     """
-    positions, normals, triangles, source = tube
-    curves = max(int((np.diff(offsets) >= 2).sum()), 1)
-    sides = max((len(positions) - len(triangles) / 2) / curves, 3.0)
+    positions, normals, _, source = tube
+    sides = _sides(tube, offsets)
     wider = np.pi / (sides * np.sin(np.pi / sides))
     places = strand_places(positions, source, points, offsets)
     curve = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
@@ -237,6 +243,39 @@ def strand_facts(
         STRAND: between(strand, places).astype(np.float32), WAY: along[source].astype(np.float32),
         ROUND: off.astype(np.float32),
     }  # fmt: skip
+
+
+def strand_shape(
+    tube: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    points: np.ndarray,
+    radii: np.ndarray,
+    offsets: np.ndarray,
+) -> np.ndarray:
+    """(V, 2) float32 what shaders/surface/strand.glsl reads of the vertices of tubes (as `tubes` returns them): the
+    strand's radius, and, as a negative whole number that float32 holds exactly, the tube's sides and the strand's
+    direction on an octahedron of AXIS_STEPS steps a side."""
+    positions, _, _, source = tube
+    sides = _sides(tube, offsets)
+    number, curve = np.arange(len(points)), np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    first, last = offsets[curve], offsets[curve + 1] - 1
+    finite = np.nan_to_num(points.astype(np.float64), posinf=0.0, neginf=0.0)  # broken points lie anywhere
+    way = finite[np.minimum(number + 1, last)] - finite[np.maximum(number - 1, first)]
+    way = _unit(way, (0.0, 0.0, 1.0))[source]
+    way /= np.abs(way).sum(axis=1, keepdims=True)
+    x, y, z = way.T
+    folded = np.stack([(1 - np.abs(y)) * np.where(x < 0, -1, 1), (1 - np.abs(x)) * np.where(y < 0, -1, 1)], axis=1)
+    flat = np.where(z[:, None] < 0, folded, way[:, :2])
+    steps = np.rint((0.5 * flat + 0.5) * (AXIS_STEPS - 1))
+    packed = (min(round(sides), 15) * AXIS_STEPS + steps[:, 0]) * AXIS_STEPS + steps[:, 1]
+    radius = between(radii[:, None], strand_places(positions, source, points, offsets))[:, 0]
+    return np.stack([np.nan_to_num(radius, posinf=0.0, neginf=0.0), -packed], axis=1).astype(np.float32)
+
+
+def _sides(tube: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray], offsets: np.ndarray) -> float:
+    """Of each tube: a ring has as many vertices, and each step from ring to ring twice as many triangles."""
+    positions, _, triangles, _ = tube
+    curves = max(int((np.diff(offsets) >= 2).sum()), 1)
+    return max((len(positions) - len(triangles) / 2) / curves, 3.0)
 
 
 def point_facts(source: np.ndarray, points: np.ndarray, radii: np.ndarray) -> dict[str, np.ndarray]:

@@ -15,12 +15,15 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from . import vdb_header
 from .cache import SnapshotCache, next_version
 from .instances import Place
 from .scene import Note, Volume, VolumeInstance
 
 MOST_VOXELS = 192  # on a side
 MOST_GRIDS = 6  # of one object
+MOST_READ = 1 << 33  # voxels of a box, read in layers
+MOST_RESAMPLED = 1 << 28  # of one that is held as a whole
 
 
 def read_volumes(
@@ -137,6 +140,7 @@ def openvdb():
 
 def _grids(path: str):
     """(arrays by name, lowest voxel, (3, 4) from voxel indices to object space); None without active voxels."""
+    vdb_header.check(path)
     grids, _ = openvdb().readAll(path)
     grids = [grid for grid in grids if hasattr(grid, "copyToArray") and grid.activeVoxelCount()][:MOST_GRIDS]
     if not grids:
@@ -147,17 +151,15 @@ def _grids(path: str):
     low = np.min([box[0] for box in boxes], axis=0)
     high = np.max([box[1] for box in boxes], axis=0)
     size = high - low + 1
+    _check(size, MOST_READ)
     factor = int(max(-(-size.max() // MOST_VOXELS), 1))
     arrays = {}
     for grid in grids:
         vector = isinstance(grid.background, tuple)
         if np.allclose(_rows(grid), rows, rtol=1e-5):
-            dense = np.zeros((*size, 3) if vector else tuple(size), np.float32)
-            grid.copyToArray(dense, ijk=tuple(int(x) for x in low))
+            arrays[grid.name] = _means(grid, low, size, vector, factor)
         else:
-            dense = _resampled(grid, rows, low, size, vector)
-        dense = np.nan_to_num(dense, nan=0.0, posinf=0.0, neginf=0.0)
-        arrays[grid.name] = _coarser(dense, factor)
+            arrays[grid.name] = _coarser(_finite(_resampled(grid, rows, low, size, vector)), factor)
     return arrays, *_frame(rows, low, factor)
 
 
@@ -169,6 +171,28 @@ def _frame(rows: np.ndarray, low: np.ndarray, factor: int) -> tuple[np.ndarray, 
     scaled[:, 3] += rows[:, :3] @ (low + (factor - 1) / 2)
     scaled[:, :3] *= factor
     return np.zeros(3), scaled
+
+
+def _check(size: np.ndarray, most: int) -> None:
+    """ValueError where a box of so many voxels is more than `most`: two voxels far apart fill any memory."""
+    if np.prod(size, dtype=np.float64) > most:
+        sides = " x ".join(str(int(side)) for side in size)
+        raise ValueError(f"voxels span a box of {sides}, more than can be read; split it, or resample it")
+
+
+def _means(grid, low: np.ndarray, size: np.ndarray, vector: bool, factor: int) -> np.ndarray:
+    """Means of `factor` voxels along each axis, read layer by layer: all at once may be more than memory holds."""
+    parts, thick = [], int(size[0]) if factor == 1 else factor
+    for x in range(0, int(size[0]), thick):
+        layer = (min(thick, int(size[0]) - x), int(size[1]), int(size[2]))
+        dense = np.zeros((*layer, 3) if vector else layer, np.float32)
+        grid.copyToArray(dense, ijk=(int(low[0]) + x, int(low[1]), int(low[2])))
+        parts.append(_coarser(_finite(dense), factor))
+    return np.concatenate(parts)
+
+
+def _finite(dense: np.ndarray) -> np.ndarray:
+    return np.nan_to_num(dense, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _coarser(dense: np.ndarray, factor: int) -> np.ndarray:
@@ -191,6 +215,8 @@ def _resampled(grid, rows: np.ndarray, low: np.ndarray, size: np.ndarray, vector
     """At the voxels' centres of another grid, the nearest voxel."""
     box = grid.evalActiveVoxelBoundingBox()
     own_low, own_size = np.array(box[0]), np.array(box[1]) - np.array(box[0]) + 1
+    for side in (size, own_size):
+        _check(side, MOST_RESAMPLED)
     dense = np.zeros((*own_size, 3) if vector else tuple(own_size), np.float32)
     grid.copyToArray(dense, ijk=tuple(int(x) for x in own_low))
     own = _rows(grid)

@@ -22,6 +22,7 @@ from .layers import add_in_order
 from .tiles import clear_outside, draw_seen
 
 STOCHASTIC, OPAQUE, LEFT_OUT, FROM_OPACITY = 0, 1, 2, 3
+COLORED = -1  # STOCHASTIC, before the colours of what passes are drawn
 TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
 
 SURFACES = tuple(f"surface.{name}" for name in SURFACE_IMAGES)
@@ -53,6 +54,10 @@ class BothWays(ABC):
     def follows_both_ways(self, frame: Frame) -> bool:
         """Whether it does in this picture, known before its first sample."""
 
+    @abstractmethod
+    def follows_coats(self, frame: Frame) -> bool:
+        """The same of a thin coat and the lobe below it."""
+
 
 def goes_both_ways(frame: Frame) -> bool:
     """Whether smooth glass that the camera sees is kept as one lobe that lets through and mirrors."""
@@ -60,10 +65,21 @@ def goes_both_ways(frame: Frame) -> bool:
     return refracts(frame) and any(one.follows_both_ways(frame) for one in asked)
 
 
+def keeps_coats(frame: Frame) -> bool:
+    """Whether a thin coat that the camera sees is kept beside the lobe below it."""
+    return any(one.follows_coats(frame) for one in frame.plan.techniques if isinstance(one, BothWays))
+
+
+def lobes_kept(frame: Frame) -> int:
+    """`glass` of draw_surfaces for what the camera sees in a sample."""
+    return (2 if goes_both_ways(frame) else int(refracts(frame))) + 4 * keeps_coats(frame)
+
+
 def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, glass: int) -> None:
     """Draw what the camera sees into six surface images with a depth buffer. `mode` says what becomes of transparent
-    layers: STOCHASTIC, OPAQUE, LEFT_OUT, or FROM_OPACITY plus thousandths of opacity. `glass`: 1 it is drawn as a
-    surface, and is no such layer; 2 so, as one lobe (goes_both_ways)."""
+    layers: STOCHASTIC, COLORED, OPAQUE, LEFT_OUT, or FROM_OPACITY plus thousandths of opacity. `glass`: 1 it is drawn
+    as a surface, and is no such layer; 2 so, as one lobe (goes_both_ways); 4 more: thin coats stay beside the lobe
+    below them (keeps_coats)."""
 
     def draw(target: images.Target, view: Block, rows: np.ndarray) -> None:
         _draw_surfaces(frame, technique, target, mode, glass, view, rows)
@@ -86,6 +102,11 @@ def _draw_surfaces(
 def drawing_constants(mode: int, glass: int) -> dict[str, int]:
     """Of the programs that draw surfaces, beside the first instance."""
     return {"transparent_mode": mode, "glass_bends": int(glass), "index_shown": -1}
+
+
+def layer_mode(frame: Frame) -> int:
+    """What becomes of layers in samples of the picture: mist is about where they stop, coloured panes included."""
+    return STOCHASTIC if frame.snapshot.film.mist else COLORED
 
 
 def data_mode(frame: Frame) -> int:
@@ -157,14 +178,16 @@ def _draw_sample(frame: Frame, technique: Technique, target: images.Target) -> N
 def _draw_layers(frame: Frame, technique: Technique, target: images.Target, view: Block, rows: np.ndarray) -> None:
     """Surfaces, and the colours of the layers before them."""
     glass = refracts(frame)
-    _draw_surfaces(frame, technique, target, STOCHASTIC, 2 if goes_both_ways(frame) else int(glass), view, rows)
-    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted or material.added}
+    mode = layer_mode(frame)
+    _draw_surfaces(frame, technique, target, mode, lobes_kept(frame), view, rows)
+    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.colors_behind}
     if not tinted:
         return
     # Multiply what was hit by the colour of the layers before it that let this sample pass.
     drawn = dict(zip(SURFACES, target.colors))
     colors = images.Target(tuple(drawn[name] for name in TINTED))
-    position, constants = {"surface_position": drawn["surface.position"]}, {"glass_bends": int(glass)}
+    position = {"surface_position": drawn["surface.position"]}
+    constants = {"glass_bends": int(glass), "transparent_mode": mode}
     with passes.drawing(colors, blend="MULTIPLY", depth_test="NONE", depth_write=False):
         _submit(frame, technique, frame.materials.tint_program, tinted, constants, view, rows, position)
     frame.count(technique, "passes")
@@ -205,7 +228,8 @@ def add_glow(frame: Frame, technique: Technique, position: images.Image, emissio
 
             def submit(behind: images.Image) -> None:
                 read = {"surface_position": behind}
-                _submit(frame, technique, frame.materials.layer_program, layers, constants, view, rows, read)
+                colors = {**constants, "transparent_mode": layer_mode(frame)}
+                _submit(frame, technique, frame.materials.layer_program, layers, colors, view, rows, read)
 
             frame.count(technique, "passes", add_in_order(target, position, submit))
             return

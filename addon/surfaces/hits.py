@@ -568,12 +568,12 @@ class Hits:
         """By material: what insides of solids absorb, per metre; which material leads those of its program, and where
         its values begin among theirs."""
         materials = frame.materials
-        media = [material.medium if material.glass else None for material in materials.compiled]
-        key = (*(medium and medium.key for medium in media), *materials.leaders, *materials.first_rows)
+        inside = [absorbed_inside(material) for material in materials.compiled]
+        key = (*inside, *materials.leaders, *materials.first_rows)
         if self._absorption is None or self._absorption[0] != key:
-            table = np.zeros((-(-max(len(media), 1) // ROW) * ROW, 4), np.float32)
-            for k, medium in enumerate(media[:MOST_MATERIALS]):
-                table[k, :3] = 0.0 if medium is None else np.clip(medium.absorption, 0.0, 1e30)
+            table = np.zeros((-(-max(len(inside), 1) // ROW) * ROW, 4), np.float32)
+            for k, absorbed in enumerate(inside[:MOST_MATERIALS]):
+                table[k, :3] = absorbed
                 table[k, 3] = materials.leaders[k] + (materials.first_rows[k] << LEADER_BITS)
             image = images.upload(table.reshape(-1, ROW, 4))
             image.defines = defines_of_absorption(table[:, :3])
@@ -588,6 +588,12 @@ class Hits:
     def release(self) -> None:
         """Drop GPU resources."""
         self.__init__()
+
+
+def absorbed_inside(material: CompiledMaterial) -> tuple[float, float, float]:
+    """What solids of a material absorb, per metre, as shaders/trace/solid.glsl asks for it: -1 of clear glass."""
+    absorbed = np.clip(material.medium.absorption, 0.0, 1e30) if material.glass and material.medium else np.zeros(3)
+    return tuple(absorbed) if absorbed.any() else (-1.0 if material.glass else 0.0,) * 3
 
 
 def defines_of_absorption(per_metre: np.ndarray) -> tuple[tuple[str, str], ...]:

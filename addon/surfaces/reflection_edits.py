@@ -138,9 +138,9 @@ def edit_table(
     closed: bool = False,
     frozen_number: int = 0,
 ) -> EditTable:
-    """`members`: for each region the bits of its constraints. `extent` of the object, m. `frozen`: an eye (3,),
-    of a picture's eyes the one that `frozen_number` says, from 1. `closed`: rays that edits send into the object go on
-    where they leave it."""
+    """`members`: for each region the bits of its constraints. `extent` of the object, m. `frozen`: an eye (3,), of
+    those for what is seen through closed objects the one that `frozen_number` says, from 1; 0: none. `closed`: rays
+    that edits send into the object go on where they leave it."""
     region = np.zeros((2 * MOST_REGIONS, 4), np.float32)
     pair = np.zeros((3 * MOST_CONSTRAINTS, 4), np.float32)
     for k, (one, bits) in enumerate(zip(regions, members)):

@@ -39,6 +39,7 @@ class ScatterMeans:
 
     def __init__(self):
         self._key: object = None
+        self.drawings = 0  # how often it was drawn: a number for what the image says
         self.image: images.Image | None = None
 
     def update(self, frame: Frame, materials: Collection[int]) -> None:
@@ -50,6 +51,7 @@ class ScatterMeans:
             return
         self.release()
         self._key = key
+        self.drawings += 1
         rows = -(-len(frame.materials.compiled) // COLUMNS)
         self.image = images.pool.take(COLUMNS, BANDS * rows, "RGBA32F")
         size = (COLUMNS * SIDE, 2 * rows * SIDE)

@@ -20,12 +20,13 @@ surfaces, is found by walks (lighting/media_bounces.py).
 | memory | 3 images; 1 and 2 of a quarter where it is spread |
 
 Sources: Kulla & Fajardo 2012; Veach & Guibas 1995 (balance heuristic). In mirrors and behind glass
-(shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass more for each round of them.
+(shaded_reflections.py) rays of lobes ask the same of the way to what they meet, a pass more for each round of them, and
+where light scatters more often another one.
 
 Bias: below FEW samples shafts are as wide as four pixels at least. Penumbrae of round lamps where walks end are those
-of points in a ball. Phase functions mixed at one place are one of their mean anisotropy. Mirrors and glass show single
-scattering alone, none in drafts and rough lobes, and no beams. Of a ray that crosses more than twelve boundaries only
-the nearest twelve are known, and how often the others lead out.
+of points in a ball. Phase functions mixed at one place are one of their mean anisotropy. Rough lobes and
+drafts show no light of media, mirrors and glass no beams, and surfaces that those show get none from media. Of a ray
+that crosses more than twelve boundaries only the nearest twelve are known, and how often the others lead out.
 """
 
 from __future__ import annotations
@@ -196,7 +197,7 @@ class Airlight(Technique):
         else:
             yield from self._draw(frame, program, names, **bindings)
         frame.count(self, "light samples", lit.rows - lit.hidden)
-        bounces = min(frame.settings.bounces, max(frame.settings.get(self, "bounces"), 0))
+        bounces = self._bounces_of(frame)
         if frame.settings.bounces and (media.media.scatters or media.media.emits):
             yield from self._bounces.sample(frame, self, media.media, lit, asked, bounces)
 
@@ -242,6 +243,12 @@ class Airlight(Technique):
             | {"shown_pixel": (0, 0), "stride": 1, "places": places, "ray_number": rays.number},
         )  # fmt: skip
         frame.count(technique, "passes")
+        media, bounces = frame.service(MediaService).media, self._bounces_of(frame)
+        if bounces and media.scatters:
+            self._bounces.on_rays(frame, technique, media, lit, self._asked(frame, lit), bounces, rays, target)
+
+    def _bounces_of(self, frame: Frame) -> int:
+        return min(frame.settings.bounces, max(frame.settings.get(self, "bounces"), 0))
 
     def _draw(self, frame: Frame, program: Program, names: tuple[str, ...], **bindings) -> Iterator[None]:
         """Draw a program's outputs into sums, band by band."""

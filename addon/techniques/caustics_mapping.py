@@ -43,6 +43,7 @@ from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters, photons
 from ..lighting.caustic_maps import INTO_MAP, LEAST_TEXELS, SEEN, CausticMaps
+from ..lighting.kept_apart import KeptApart
 from ..lighting.light_views import LightBuffers, widened
 from ..lighting.photons import MAP, Photons
 from ..scene import acceleration
@@ -91,6 +92,7 @@ class CausticsMapping(Technique):
 
     def __init__(self):
         self._photons = Photons()
+        self._apart = KeptApart()
         self._receivers = LightBuffers()
         self._map: images.Target | None = None
         self._casters: caustic_casters.Casters | None = None
@@ -111,10 +113,15 @@ class CausticsMapping(Technique):
         self._casters = caustic_casters.of(frame)
         if self._casters is not None:
             self._photons.begin(frame, self._casters)
+            self._apart.begin(frame, ("diffuse_indirect",))
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if self._casters is None or frame.receivers is None or not len(frame.receivers.distance):
             return
+        with self._apart.drawing(frame, self):
+            yield from self._add(frame)
+
+    def _add(self, frame: Frame) -> Iterator[None]:
         settings = frame.settings
         side, map_side = settings.get(self, "grid"), settings.get(self, "map_size")
         by_rays = settings.get(self, "by") == RAYS

@@ -14,8 +14,9 @@ whose edges are sharp.
 
 w is symmetric and the centre keeps what the weights lack to one: pixels exchange light and none is lost, however skewed
 the noise. Its variance is the geometric mean, so that a bright rim does not spread into its dark surroundings. Pixels
-exchange light of lobes and glass only if these show what reflects alike (hits/guide.frag.glsl). Where both halves agree
-nothing changes, so the result still converges; textures are divided out before and stay.
+exchange light of lobes and glass only if these show what reflects alike (hits/guide.frag.glsl). What photons bring is
+taken out before and put back behind (lighting/kept_apart.py). Where both halves agree nothing changes, so the result
+still converges; textures are divided out before and stay.
 
 | cost | after the last sample |
 |---|---|
@@ -41,6 +42,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..lighting.grass import GrassTable
+from ..lighting.kept_apart import apart_of
 from ..lighting.path_sources import SHOWN, SHOWN_THROUGH
 from ..scene.media import has_media
 from ..scene.view import VIEW
@@ -125,6 +127,15 @@ END = passes.fullscreen_program(
     defines=LEAST_COLOR,
     outputs=(("VEC4", "out_sum"),),
 )
+# The same for light of which photons have brought a part.
+BEGIN_BESIDE_PHOTONS = replace(
+    BEGIN, name="denoise: light and variance beside photons", defines=(*BEGIN.defines, ("APART", "1")),
+    textures=(*BEGIN.textures, ("RGBA32F", "apart_sum"), ("RGBA32F", "apart_half")),
+)  # fmt: skip
+END_BESIDE_PHOTONS = replace(
+    END, name="denoise: reflected light beside photons", textures=(*END.textures, ("RGBA32F", "apart_sum")),
+    defines=(*END.defines, ("APART", "1")),
+)  # fmt: skip
 END_OF_MEDIA = replace(
     END, name="denoise: light of media", textures=(END.textures[0], END.textures[2]), defines=(("OF_MEDIA", "1"),)
 )
@@ -183,6 +194,9 @@ class Denoise(Technique):
             # A pass tree may show what no light path needs.
             if write.name.startswith("denoise.") and write.name in frame.images:
                 frame.target(write.name).clear()
+        for path in map(apart_of, self._paths(frame)):
+            if f"film.{path}" in frame.images:
+                frame.held.add(Write(f"denoise.{path}_half", "RGBA32F", "What its first half summed up"))
         frame.read_last |= {"surface.position", "surface.lobe"} if _beside_grass(frame) else {"surface.position"}
 
     def sample(self, frame: Frame) -> None:
@@ -190,7 +204,7 @@ class Denoise(Technique):
         if frame.settings.may_end_early:
             self._keep_doubles(frame, done)
         elif done == frame.settings.samples // 2:
-            for path in self._paths(frame):
+            for path in self._summed(frame):
                 passes.copy(frame.images[f"film.{path}"], frame.target(f"denoise.{path}_half"))
 
     def _keep_doubles(self, frame: Frame, done: int) -> None:
@@ -198,7 +212,7 @@ class Denoise(Technique):
         is always from a third to two thirds of the way."""
         if done & (done - 1):
             return
-        for path in self._paths(frame):
+        for path in self._summed(frame):
             half, before = f"denoise.{path}_half", f"denoise.{path}_before"
             if before not in frame.images:
                 frame.images[before] = images.pool.take(*frame.size, "RGBA32F")
@@ -229,6 +243,11 @@ class Denoise(Technique):
         shown = shown_paths(frame)
         return [path for path in FILTERS if path in shown and f"radiance.{path}" in frame.images]
 
+    def _summed(self, frame: Frame) -> list[str]:
+        """Of which the sums of the first half of the samples are kept."""
+        paths = self._paths(frame)
+        return [*paths, *(path for path in map(apart_of, paths) if f"denoise.{path}_half" in frame.images)]
+
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:
         sums, guides = {"sum_now": frame.images[f"film.{path}"]}, {"surface_position": frame.images["surface.position"]}
         begin, level, end = (BEGIN_OF_MEDIA, LEVEL_OF_MEDIA, END_OF_MEDIA) if path in OF_MEDIA else (BEGIN, LEVEL, END)
@@ -241,12 +260,17 @@ class Denoise(Technique):
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
         half_count, half = self._half(frame, path, count)
         grass = path == "diffuse_direct" and _beside_grass(frame)
-        lobes = {"surface_lobe": frame.images["surface.lobe"]} if grass else {}
+        begin = BEGIN_BESIDE_GRASS if grass else begin
+        beside = {"surface_lobe": frame.images["surface.lobe"]} if grass else {}
+        if f"denoise.{apart_of(path)}_half" in frame.images:
+            begin, end = BEGIN_BESIDE_PHOTONS, END_BESIDE_PHOTONS
+            sums["apart_sum"] = frame.images[f"film.{apart_of(path)}"]
+            beside["apart_half"] = frame.images[self._half(frame, apart_of(path), count)[1]]
         with images.borrowed(*frame.size, "RGBA32F") as light, images.borrowed(*frame.size, "RGBA32F") as other:
             for rows in frame.bands(self):
                 passes.fullscreen(
-                    BEGIN_BESIDE_GRASS if lobes else begin, light, rows=rows, blocks=blocks,
-                    textures={**guides, **sums, **lobes, "half_sum": frame.images[half]},
+                    begin, light, rows=rows, blocks=blocks,
+                    textures={**guides, **sums, **beside, "half_sum": frame.images[half]},
                     constants={"count": count, "half_count": half_count, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield

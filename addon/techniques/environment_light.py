@@ -12,10 +12,11 @@ arrived in the samples before (a control variate, shaders/lib/known_irradiance.g
 in every sample. Directions count there by how open the probes found the scene.
 
 Where many pixels see little of the world (a gallery behind columns), each pixel of a final picture traces rays drawn
-from a table of its tile (addon/sources/world_tiles.py): as many as leave the noise of the directions that would be
-shared, and no more than take the time of their maps; the probes tell beforehand which of the two leaves less error.
-Where a ray of each pixel costs less than a map, rays answer for shared directions, too. Auto draws one to eight
-directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py).
+from a table of its tile (addon/sources/world_tiles.py): as many as leave the noise of shared directions, in no more
+time than their maps; the probes tell which leaves less error. The only sample of a picture does so wherever a ray
+leaves less noise than a direction: hard shadows of few directions would pass through an animation with the camera.
+Where rays cost less than maps, they answer for shared directions, too. Auto draws one to eight directions a sample, up
+to 16 in pictures of few samples (addon/sources/rates.py).
 
 | cost | per sample |
 |---|---|
@@ -23,8 +24,7 @@ directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py
 | passes | 2 over the screen |
 | rays | per pixel, about 1 instead of each 4 or more maps |
 
-Bias: the first sample takes its own share of the known light, an error that falls with directions and samples; the
-irradiance is known to within 0.3 %.
+Bias: the first sample takes its own share of the known light, an error that falls with directions and samples.
 
 Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (traced_glossy). Few
 samples under an even sky show faint overlapping hard shadows. Figures: docs/log/2026-11-26-environment.md.
@@ -313,15 +313,18 @@ class EnvironmentLight(Technique):
         # Maps ask the material of a layer itself; rays know it by cells.
         layered = any(material.transparent for material in frame.materials.compiled)
         told_apart = bright_world(frame) is not None  # a row stands for all directions, and glass stops some of them
-        if useful is None or asked or layered or told_apart or not denoised or not frame.settings.schedule.known_total:
+        only = frame.settings.samples == 1  # nothing is denoised, and shadows of shared directions lie over each other
+        known = frame.settings.schedule.known_total
+        if useful is None or asked or layered or told_apart or not (denoised or only) or not known:
             return None
         moments = frame.environment.guide_moments()
         own, shared = world_tiles.variances(useful, moments)
-        if shared < FRAGMENTED or own >= UNSHARED * shared / min(rate.per_sample, USUAL):
+        worth = 1.0 if only else UNSHARED / min(rate.per_sample, USUAL)
+        if (shared < FRAGMENTED and not only) or own >= worth * shared or frame.hierarchy("shadow") is None:
             return None
-        if frame.hierarchy("shadow") is None:
+        self._rays_for_direction = 1.0 if only else own / (UNSHARED * shared)
+        if only and self._maps_per_ray(frame, self._resolution(frame)) < own / shared:
             return None
-        self._rays_for_direction = own / (UNSHARED * shared)
         chance = world_tiles.tables(world_tiles.arriving(useful, moments[0]), moments[0])
         self._tiles = (useful.shape[1], useful.shape[0])
         return images.upload(world_tiles.lower_edges(chance), "R32F")

@@ -56,7 +56,11 @@ SPECTRA = (
     ("LED", "White LED", 2, "A blue line and a broad yellow"),
     ("FLUORESCENT", "Fluorescent", 3, "Lines of blue, green and red: needles have separate colours"),
     ("SODIUM", "Sodium", 4, "One yellow line: needles and rings without colours, and sharp"),
-)
+    (
+        spectrum.COLOUR, "By Colour", 5,
+        "A smooth spectrum of the colour of what dazzles; for lamps of a temperature nearly a blackbody's",
+    ),
+)  # fmt: skip
 LEAST_SIDE, MOST_SIDE = 512, 2048  # of a pattern whose size follows from the brightness of the picture
 SIDES = (
     (AUTO, "Automatic", 0, "As large as the brightest light needs, so that its glare ends where nobody sees it"),
@@ -81,10 +85,7 @@ class PointSpread(Service):
     def aperture(self, frame: Frame, luminance: float) -> Aperture:
         """While the eye looks at a picture of this mean luminance, cd/m2."""
         decades = np.round(np.log10(max(luminance, 1e-6)) / LUMINANCE_STEP) * LUMINANCE_STEP
-        seconds = frame.snapshot.moment.seconds
-        return aperture_at(
-            eye_of(frame.settings), seconds * frame.settings.get(self._technique, "speed"), 10.0**decades
-        )
+        return aperture_of(frame.settings, frame.snapshot.moment.seconds, 10.0**decades)
 
     def scale(
         self, frame: Frame, aperture: Aperture, degrees_per_pixel: float, magnification: float,
@@ -101,12 +102,17 @@ class PointSpread(Service):
                 return scale
             self._side *= 2
 
-    def pattern(self, frame: Frame, aperture: Aperture) -> point_spread.Pattern:
-        """Of white light; drawn anew where the aperture differs. It is the service's own."""
+    def needs_colour(self, frame: Frame) -> bool:
+        """Whether the pattern depends on the colour of what dazzles."""
+        return frame.settings.get(self._technique, "spectrum") == spectrum.COLOUR
+
+    def pattern(self, frame: Frame, aperture: Aperture, colour=spectrum.WHITE) -> point_spread.Pattern:
+        """Its channels have a mean of 1 for the light's own colour; drawn anew where aperture or spectrum differ. It is
+        the service's own. `colour`: of what dazzles, linear Rec. 709."""
         settings, technique = frame.settings, self._technique
         side, defocus = self._side, settings.get(technique, "defocus")
         least = settings.get(technique, "wavelengths")
-        light = settings.get(technique, "spectrum"), settings.get(technique, "kelvin")
+        light = technique.light(settings, colour)
         planes = settings.get(technique, "planes") == THREE
         key = (side, defocus, least, aperture.diameter, aperture.closed, aperture.strokes.tobytes(), light, planes)
         if self._pattern is None or self._pattern[0] != key:
@@ -116,9 +122,12 @@ class PointSpread(Service):
             frame.count(technique, "obstacles", len(aperture.strokes))
         return self._pattern[1]
 
-    def kernel(self, frame: Frame, aperture: Aperture, scale: optics.Scale, sharp: bool) -> point_spread.Kernel:
-        """Over the picture's pixels; `sharp`: without the light that is not scattered. It is the service's own."""
-        pattern = self.pattern(frame, aperture)
+    def kernel(
+        self, frame: Frame, aperture: Aperture, scale: optics.Scale, sharp: bool, colour=spectrum.WHITE
+    ) -> point_spread.Kernel:
+        """Over the picture's pixels; `sharp`: without the light that is not scattered. It is the service's own.
+        `colour`: of what dazzles, where `needs_colour`."""
+        pattern = self.pattern(frame, aperture, colour)
         key = (self._pattern[0], scale, sharp)
         if self._kernel is None or self._kernel[0] != key:
             if self._kernel is not None:
@@ -237,6 +246,12 @@ class EyeModel(Technique):
         found = (LEAST_SIDE, MOST_SIDE) if side == AUTO else (int(side), int(side))
         return tuple(min(one, DRAFT_SIDE) for one in found) if settings.schedule.is_draft else found
 
+    def light(self, settings: Settings, colour=spectrum.WHITE) -> spectrum.Light:
+        """The spectrum as set; `colour`: of what dazzles, linear Rec. 709."""
+        kind = settings.get(self, "spectrum")
+        known = {spectrum.BLACKBODY: settings.get(self, "kelvin"), spectrum.COLOUR: spectrum.rounded(colour)}
+        return kind, known.get(kind)
+
     def show(self, frame: Frame) -> None:
         frame.provide(self._service)
 
@@ -244,12 +259,14 @@ class EyeModel(Technique):
         self._service.release()
 
 
-def eye_of(settings: Settings) -> Eye:
-    """The observer as set."""
+def aperture_of(settings: Settings, seconds: float, luminance: float) -> Aperture:
+    """The observer as set, at a second of the scene's time, looking at a mean luminance in cd/m2."""
     names = (
         "age", "pupil", "before", "restlessness", "tremor", "movement", "scatter", "fibres", "lashes", "squint",
         "blink", "blinks_per_minute",
     )  # fmt: skip
     values = {param.name: settings.value(EyeModel.name, param) for param in EyeModel.params}
-    changed = values["changed"] * values["speed"]
-    return Eye(seed=values["person"], changed=changed, **{name: values[name] for name in names})
+    own = seconds * values["speed"]
+    changed = own - (seconds - values["changed"])  # it adapts in the scene's time, whether or not it moves by itself
+    eye = Eye(seed=values["person"], changed=changed, **{name: values[name] for name in names})
+    return aperture_at(eye, own, luminance)

@@ -7,14 +7,14 @@ of the same surface with its own fresh light:
     light = mix(before, fresh, 1 / (1 + n)),  n = samples that stand behind `before`, at most MANY
 
 so that n pictures of a still surface have the error of n samples. The same surface is one that lies on the tangent
-plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees). What was hidden before has no
-history: its light is the fresh one. Indirect light is filtered over neighbours (film/neighbours.py) when it is
-joined, not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. While objects move n is
-at most FEW, for light straight from lamps only where a moving object's box stands or stood before one of them; there it
-is kept within the spread of what is fresh on 5x5 pixels, so that shadows move along. (Everywhere, where the world or
-meshes shine.) While lamps move n is at most LAMPS, and less where a step changes more than LAG / LAMPS of their light.
-After any other edit (and while lamps of node trees move) there is no history at all (frame/history.py); what shines
-is never carried: it moves otherwise than its surface.
+plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees); n is multiplied by the share of
+the bilinear weights that is on it. What was hidden before has only fresh light. Indirect light is filtered over
+neighbours (film/neighbours.py) when it is joined, not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24
+on not at all. While objects move n is at most FEW, for light straight from lamps only where a moving object's box
+stands or stood before one of them; there it is kept within the spread of what is fresh on 5x5 pixels, so that shadows
+move along. (Everywhere, where the world or meshes shine.) While lamps move n is at most LAMPS, and less where a step
+changes more than LAG / LAMPS of their light. After any other edit (and while lamps of node trees move) there is no
+history at all (frame/history.py); what shines is never carried: it moves otherwise than its surface.
 
 In drafts of the viewport, and, where `animation` says so, in final pictures of one sample drawn one after the other
 by one process; a picture then depends on those before it. Never in slices, with motion blur or where samples may end

@@ -55,6 +55,7 @@ from ..scene.view import VIEW
 from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACES, draw_scatter
+from ..surfaces.hits import Hits
 from ..surfaces.scatter_means import ScatterMeans
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
 
@@ -102,11 +103,17 @@ INDIRECT = passes.fullscreen_program(
 CHORD = passes.fullscreen_program(
     "subsurface chord",
     "subsurface/chord.frag.glsl",
-    textures=(*RAYS.textures, *POINT_TEXTURES, ("RGBA32F", "point_curve")),
+    textures=(
+        *RAYS.textures, *POINT_TEXTURES, ("RG32F", "trace_owners"),
+        *(("RGBA32F", name) for name in (
+            "point_curve", "point_instances", "scatter_objects", "scatter_near", "scatter_means",
+        )),
+    ),
     blocks=((VIEW, "film_view"),),
-    constants=(*RAYS.constants, ("FLOAT", "longest")),
+    constants=(*RAYS.constants, ("FLOAT", "longest"), ("INT", "first_object"), ("INT", "first_leaf")),
+    defines=(("RANGE", str(RANGE)),),
     outputs=(("VEC4", "out_shape"),),
-)
+)  # fmt: skip
 LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
 PROFILES, SPLATS = "PROFILES", "SPLATS"
 
@@ -179,7 +186,7 @@ class ImageSpaceSubsurface(Technique):
         self._shapes: images.Image | None = None  # of cells: normal, depth, mean length of lines through
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
-        self._met: tuple[int, int] | None = None  # what the rays of these have met
+        self._met: tuple[int, int, int] | None = None  # what the rays of these have met
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         shown = snapshot.used_materials
@@ -223,26 +230,28 @@ class ImageSpaceSubsurface(Technique):
         if not self._materials:
             return
         moved = self.points.update(frame, frame.settings.get(self, "points"))
+        means = frame.kept(ScatterMeans)
+        means.update(frame, self._materials)
         # What stands inside an object makes it thinner, too.
-        met = frame.geometry.changes, frame.hierarchy("shadow").leaves.number
+        met = frame.geometry.changes, frame.hierarchy("shadow").leaves.number, means.drawings
         if moved or met != self._met:
             self._measure(frame)
             self._met = met
         if self._lobes is None:
             self._lobes = images.upload(diffusion.table())
         self._give_whole()
-        self._whole = [images.Target((images.pool.take(*frame.size, "RGBA32F"),)) for _ in range(2)]
-        self._whole[0].clear()
         self._light.begin(frame)
         if self._splatted(frame.settings, frame.snapshot):
             self._splats.begin(frame, self.points, self._materials, frame.settings.get(self, "grid"))
-        elif frame.settings.get(self, "form") == SPLATS:
-            frame.account.chose(self, "form", f"{PROFILES}, because {bends_lines(frame.snapshot)}")
+        else:
+            self._whole = [images.Target((images.pool.take(*frame.size, "RGBA32F"),)) for _ in range(2)]
+            self._whole[0].clear()
+            if frame.settings.get(self, "form") == SPLATS:
+                frame.account.chose(self, "form", f"{PROFILES}, because {bends_lines(frame.snapshot)}")
         self._leaving_sample, self._direct = -1, None
         self._leaving.begin()
         walked = [k for k in self._materials if may_walk(frame.snapshot.materials[k].graph)]
         if walked and self.points.rows:
-            frame.kept(ScatterMeans).update(frame, walked)
             if moved or self._leaving.image is None:
                 self._leaving.update(self.points, walked)
             frame.provide(LeavingService(lambda: self._leaving_image(frame)))
@@ -250,20 +259,27 @@ class ImageSpaceSubsurface(Technique):
         frame.count(self, "objects", len(self.points.objects))
 
     def _measure(self, frame: Frame) -> None:
-        """How thick objects are at their points."""
+        """How thick objects are at their points, and how much of Burley's profile contours add."""
         self._give_shapes()
         if not self.points.rows:
             return
         self._shapes = images.pool.take(ROW, self.points.rows, "RGBA32F")
         position, normal = self.points.surface(0)
         textures, constants = ray_bindings(frame)
+        owners, first_leaf = frame.kept(Hits).owners(frame, frame.hierarchy("shadow"))
         passes.fullscreen(
             CHORD, images.Target((self._shapes,)),
             textures={
                 **textures, "point_position": position, "point_normal": normal, "point_entry": self.points.entries(0),
-                "point_curve": self.points.curves,
+                "point_curve": self.points.curves, "point_instances": self.points.instances, "trace_owners": owners,
+                "scatter_objects": self.points.table, "scatter_near": self.points.near,
+                "scatter_means": frame.kept(ScatterMeans).image,
             },
-            blocks={"film_view": frame.view_block}, constants={**constants, "longest": 2.0 * frame.geometry.size},
+            blocks={"film_view": frame.view_block},
+            constants={
+                **constants, "longest": 2.0 * frame.geometry.size, "first_object": self.points.first_object,
+                "first_leaf": first_leaf,
+            },
         )  # fmt: skip
 
     # Light at points of the mesh --------------------------------------------------------------------------------------

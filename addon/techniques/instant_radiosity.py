@@ -41,8 +41,9 @@ import numpy as np
 from ..film.neighbours import smooth
 from ..frame.picture import Frame
 from ..frame.settings import Settings
+from ..frame.shares import clamped, plans_samples
 from ..frame.technique import Param, Service, Technique, Write
-from ..gfx import passes
+from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..lighting.asked import lit_at_hits
@@ -58,6 +59,7 @@ from ..lighting.virtual_lights import (
 )
 from ..materials.compiler import may_emit, may_reflect
 from ..materials.graph import Graph
+from ..sampling.interleaved import Interleaving, interleaving
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import ANY_SURFACE, LIT_SURFACES, MARKS
@@ -68,6 +70,7 @@ SUBSETS = 2  # of the virtual lights, of which each pixel looks at one
 SEVERAL = 2  # samples, from which on Denoise runs, and rays of pixels look farther
 FARTHER = 0.2  # median distances of what is seen: their reach then
 MORE_RAYS = 4  # times, in a picture of one sample
+FEWEST_LIGHTS = 64  # of a light group's, where several share out the pixels
 LOBE_RAYS = 4  # of a pixel in a sample, where a glossy lobe is most of what is seen
 GATHER_TEXTURES = (("RGBA32F", "virtual_lights"), *PATH_TEXTURES)
 NEAR_CONSTANTS = (
@@ -89,19 +92,32 @@ class GatherBindings(Service):
     bindings: dict[str, dict]
 
 
+RECTANGLE = (("IVEC2", "rectangle"), ("IVEC2", "place_within"))
+SPREAD = passes.fullscreen_program(
+    "light of interleaved pixels",
+    "indirect/interleaved.frag.glsl",
+    textures=(("RGBA32F", "gathered_diffuse"), ("RGBA32F", "gathered_glossy")),
+    constants=(*RECTANGLE, ("FLOAT", "weight")),
+    outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+)
+
+
 @cache
-def gather_program(kinds: int, glossy: bool, soft: bool) -> Program:
+def gather_program(kinds: int, glossy: bool, soft: bool, interleaved: bool = False) -> Program:
     """For light sources of these kinds (bits as in lights.LAMPS), and surfaces that may be glossy, or have a lobe of
-    lib/soft_lobe.glsl."""
+    lib/soft_lobe.glsl; `interleaved`: one pixel of each rectangle."""
     return passes.fullscreen_program(
         "instant radiosity",
         "indirect/gather.frag.glsl",
         textures=GATHER_TEXTURES,
         blocks=PATH_BLOCKS,
-        constants=(*GATHER_CONSTANTS, *TRACED.constants),
-        defines=(*gather_defines(kinds, glossy, soft), ("SUBSETS", str(SUBSETS))),
+        constants=(*GATHER_CONSTANTS, *TRACED.constants, *(RECTANGLE if interleaved else ())),
+        defines=(
+            *gather_defines(kinds, glossy, soft), ("SUBSETS", str(SUBSETS)),
+            *((("INTERLEAVED", "1"),) if interleaved else ()),
+        ),
         outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
-    )
+    )  # fmt: skip
 
 
 def gather_defines(kinds: int, glossy: bool, soft: bool) -> tuple[tuple[str, str], ...]:
@@ -115,7 +131,7 @@ def lobes_of(frame: Frame) -> tuple[bool, bool]:
     return to_hold((frame.materials.glossy, frame.materials.soft), (True, True))
 
 
-GATHERS = (gather_program(-1, True, True), gather_program(0, False, False))
+GATHERS = (gather_program(-1, True, True), gather_program(0, False, False), gather_program(-1, True, True, True))
 INDIRECT_WRITES = (
     Write("radiance.diffuse_indirect", "RGBA32F", "Light that diffuse surfaces receive from other surfaces", True),
     Write("radiance.glossy_indirect", "RGBA32F", "Light that glossy surfaces receive from other surfaces", True),
@@ -174,6 +190,13 @@ def deeper_weight(frame: Frame) -> float:
     return float(DEEPER) if frame.sample % DEEPER == chosen else 0.0
 
 
+def _deeper_turn(number: int, count: int) -> float:
+    """The same weight, where only `count` samples have a turn: both halves of the picture have as many of them."""
+    if count % (2 * DEEPER):
+        return 1.0
+    return float(DEEPER) if number % DEEPER == DEEPER_ORDER[number // DEEPER % len(DEEPER_ORDER)] else 0.0
+
+
 class InstantRadiosity(Technique):
     name = "instant_radiosity"
     label = "Instant radiosity"
@@ -196,30 +219,66 @@ class InstantRadiosity(Technique):
 
     def __init__(self):
         self.virtual_lights = VirtualLights()
+        self._interleaving: Interleaving | None = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
 
     def begin(self, frame: Frame) -> None:
         self.virtual_lights.begin(frame)
+        settings = frame.settings
+        shared = plans_samples(frame) and not clamped(frame)
+        self._interleaving = interleaving(settings.takes, settings.samples, settings.take) if shared else None
+        if self._interleaving is not None:
+            why = f"in one of {self._interleaving.count} pixels, because {settings.takes} light groups are added up"
+            frame.account.chose(self, "its light", why)
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
-        lights = yield from self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
+        wanted = frame.settings.get(self, "virtual_lights")
+        part = self._interleaving
+        if part is not None:  # those of all groups together are as many as a picture has
+            wanted = max(wanted // part.count, min(wanted, FEWEST_LIGHTS))
+        lights = yield from self.virtual_lights.make(frame, self, wanted)
         bindings = gather_bindings(frame, self.virtual_lights, lights)
-        bindings["constants"]["rays"] = self._rays(frame)
-        bindings["constants"] |= self._reach(frame, -(-lights.wanted // SUBSETS))
+        constants = bindings["constants"]
+        constants["rays"] = self._rays(frame)
+        constants |= self._reach(frame, -(-lights.wanted // SUBSETS))
         yield
-        target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
         bindings["textures"] = dict(bindings["textures"])  # not of those who gather these lights, too
-        program = gather_program(self.virtual_lights.kinds, *lobes_of(frame))
+        program = gather_program(self.virtual_lights.kinds, *lobes_of(frame), part is not None)
         program = lit_at_hits(frame, program, bindings["textures"])
-        for rows in frame.bands(self):
-            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
-            yield
+        if part is None:
+            target = frame.target(*(write.name for write in INDIRECT_WRITES), depth=MARKS)
+            for rows in frame.bands(self):
+                passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
+                yield
+        else:
+            yield from self._draw_part(frame, part, program, bindings)
         smooth(frame, self, "radiance.diffuse_indirect")
         frame.count(self, "passes")
+
+    def _draw_part(self, frame: Frame, part: Interleaving, program: Program, bindings: dict) -> Iterator[None]:
+        """Draw one pixel of each rectangle, in an image of these alone: processors skip groups of pixels, but no
+        single ones."""
+        place = {"rectangle": (part.columns, part.rows), "place_within": part.place(frame.sample)}
+        deeper = _deeper_turn(part.visit(frame.sample), frame.settings.samples // part.count)
+        constants = {**bindings["constants"], **place, "deeper": deeper}
+        bindings = {**bindings, "constants": constants}  # not of those who gather these lights, too
+        size = part.size(*frame.size)
+        with images.borrowed(*size, "RGBA32F") as diffuse, images.borrowed(*size, "RGBA32F") as glossy:
+            drawn = images.Target((*diffuse.colors, *glossy.colors))
+            for first, end in frame.bands(self):
+                rows = -(-first // part.rows), -(-end // part.rows)
+                if rows[0] < rows[1]:
+                    passes.fullscreen(program, drawn, rows=rows, **bindings)
+                yield
+            passes.fullscreen(
+                SPREAD, frame.target(*(write.name for write in INDIRECT_WRITES)), blend="ADDITIVE_PREMULT",
+                textures=dict(zip(("gathered_diffuse", "gathered_glossy"), drawn.colors)),
+                constants={**place, "weight": float(part.count)},
+            )  # fmt: skip
 
     def _rays(self, frame: Frame) -> int:
         """Noise of the choice is that of the pixel alone, and averages out over samples while that of the virtual

@@ -210,7 +210,8 @@ class LightProbes(Technique):
         samples = frame.settings.samples
         planned = samples if points else max(samples, USUAL_SAMPLES)
         alone = not frame.plan.fills("indirect")
-        asked = frame.settings.get(self, "maps")
+        # Light groups that are added up share them out.
+        asked = max(frame.settings.get(self, "maps") / frame.settings.takes, 1.0)
         budget = budget_for(joint, planned, paying(asked, planned, alone), film)
         rates = allocate(joint, samples, budget, film)
         if lit:

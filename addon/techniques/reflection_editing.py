@@ -47,6 +47,7 @@ KINDS = {
     "EUCLIDEAN": reflection_edits.EUCLIDEAN, "GEODESIC": reflection_edits.GEODESIC,
     "PAINTED": reflection_edits.PAINTED,
 }  # fmt: skip
+MOST_FROZEN = 511  # eyes that shaders/edit/frozen.glsl has numbers for
 NOTHING_EDITED = "no object has an edit of its reflections"
 EDIT, EDIT_AT_POINT = "surface.edit", "surface.edit_at_point"
 CONSTRAINT = (
@@ -120,8 +121,9 @@ PROGRAMS = (edit_program(0), edit_program(MOST_LAYERS))
 class _Edited:
     """An object with its edits on the GPU."""
 
-    def __init__(self, at_hits: EditedObject, batch: geometry.Batch, layers: int, largest: float):
+    def __init__(self, at_hits: EditedObject, batch: geometry.Batch, layers: int, largest: float, eye: int):
         self.at_hits, self.batch, self.layers, self.largest = at_hits, batch, layers, largest
+        self.eye = eye  # number of the view that stays in what is seen through it; 0: none
         self.row, self.table = at_hits.row, at_hits.table
 
 
@@ -150,7 +152,7 @@ class ReflectionEditing(Technique):
     def __init__(self):
         self._edited: list[_Edited] = []
         self._kept: dict[object, _Edited] = {}
-        self._surfaces: dict[object, geodesic.Surface] = {}
+        self._surfaces: dict[object, tuple[geodesic.Surface, bool]] = {}  # and whether it is closed
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not has_edits(snapshot):
@@ -160,8 +162,8 @@ class ReflectionEditing(Technique):
     def begin(self, frame: Frame) -> None:
         rows = {id(instance): row for row, instance in enumerate(frame.geometry.placed[0])}
         kept: dict[object, _Edited] = {}
-        surfaces: dict[object, geodesic.Surface] = {}
-        eyes: list[np.ndarray] = []  # of views that stay, a number each
+        surfaces: dict[object, tuple[geodesic.Surface, bool]] = {}
+        eyes: list[np.ndarray] = []  # of views that stay in what is seen through closed objects, a number each
         for instance in frame.snapshot.instances:
             constraints, regions = _edits(instance)
             mesh = frame.snapshot.meshes[instance.mesh]
@@ -170,11 +172,13 @@ class ReflectionEditing(Technique):
             row = rows[id(instance)]
             origin = tuple(frame.geometry.origin)
             where = (instance.mesh, mesh.version, instance.matrix.tobytes(), row, origin)
-            surfaces[where] = self._surfaces.get(where) or _surface(frame, instance, mesh)
-            if own_value(instance.own, ReflectionEditing, "freeze"):
+            surfaces[where] = self._surfaces.get(where) or (_surface(frame, instance, mesh), _is_closed(mesh))
+            number = 0
+            if surfaces[where][1] and own_value(instance.own, ReflectionEditing, "freeze") and _bends(constraints):
                 eyes.append(_moved(_placed(frame, instance), constraints[0]["viewer"]))
-            key = (*where, instance.own, instance.materials, _indices(frame, instance), len(eyes))
-            kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, surfaces[where], len(eyes))
+                number = len(eyes)
+            key = (*where, instance.own, instance.materials, _indices(frame, instance), number)
+            kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, *surfaces[where], number)
         self._kept, self._edited, self._surfaces = kept, list(kept.values()), surfaces
         frame.ledger.notes = (*frame.ledger.notes, *self._unfrozen(frame))
         frame.shared(SurfaceStages).apply.append(self._at_film_point)
@@ -183,12 +187,17 @@ class ReflectionEditing(Technique):
     def _unfrozen(self, frame: Frame) -> list[Note]:
         """What Freeze does not keep: of glass one of its two ways is edited."""
         mirrors, shows = "what the glass mirrors", "what is seen through it"
-        found = []
-        for one in (one.at_hits.instance for one in self._edited):
+        found, later = [], [one.at_hits.instance.object_name for one in self._edited if one.eye > MOST_FROZEN]
+        if later:
+            text = f"Freeze Reflections keeps what is seen through {MOST_FROZEN} closed objects, not through more."
+            others = f" and {len(later) - 1} more" if len(later) > 1 else ""
+            found.append(Note(f"Object '{later[0]}'{others}", text))
+        for one in (one.at_hits.instance for one in self._edited if one.eye <= MOST_FROZEN):
             glass = any(frame.materials.compiled[slot].glass for slot in one.materials)
             if glass and own_value(one.own, ReflectionEditing, "freeze"):
-                bends = any(constraint["of"] == REFRACTION for constraint in _edits(one)[0])
-                kept, left, other = (shows, mirrors, "Reflection") if bends else (mirrors, shows, "Refraction")
+                kept, left, other = (
+                    (shows, mirrors, "Reflection") if _bends(_edits(one)[0]) else (mirrors, shows, "Refraction")
+                )
                 text = f"Freeze Reflections keeps {kept}, not {left}: that is for constraints of {other} alone."
                 found.append(Note(f"Object '{one.object_name}'", text))
         return found
@@ -242,6 +251,11 @@ def _edits(instance: Instance) -> tuple[list[dict], list[dict]]:
     return constraints[:MOST_CONSTRAINTS], regions[:MOST_REGIONS]
 
 
+def _bends(constraints: list[dict]) -> bool:
+    """Whether some edit what is seen through the surface."""
+    return any(one["of"] == REFRACTION for one in constraints)
+
+
 def _indices(frame: Frame, instance: Instance) -> tuple[float, ...]:
     """Refractive indices of the glass in an instance's slots, by which constraints know what is seen without them."""
     compiled = [frame.materials.compiled[slot] for slot in instance.materials]
@@ -263,9 +277,9 @@ def _placed(frame: Frame, instance: Instance) -> np.ndarray:
 
 
 def _made(
-    frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geodesic.Surface, eyes: int
+    frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geodesic.Surface, closed: bool, eye: int
 ) -> _Edited:  # fmt: skip
-    """`eyes`: how many views that stay there are, this object's, if it has one, being the last."""
+    """`eye`: number of the view that stays in what is seen through it, from 1; 0: none."""
     matrix, world, corners = _placed(frame, instance), surface.positions, surface.triangles
     surface.begin()
     wanted_constraints, wanted_regions = _edits(instance)
@@ -282,7 +296,6 @@ def _made(
     # What is painted is the same for all regions; it comes first, since nothing can stand for it.
     if any(one["kind"] == "PAINTED" for one in wanted_regions):
         layers.append(_painted(mesh))
-    closed = _is_closed(mesh)
     found = [_constraint(frame, instance, mesh, matrix, surface, closed, one) for one in wanted_constraints]
     widest = max((scale * one["radius"] for one in wanted_regions if one["kind"] == "GEODESIC"), default=0.0)
     if widest > 0.0:  # places of a region are within two radii of its constraints, and edges that paths begin with
@@ -303,7 +316,7 @@ def _made(
     if own_value(instance.own, ReflectionEditing, "freeze"):
         frozen = _moved(matrix, wanted_constraints[0]["viewer"])
     extent = float(np.linalg.norm(np.ptp(world, axis=0)))
-    table = reflection_edits.edit_table(found, regions, members, extent, frozen, closed, eyes)
+    table = reflection_edits.edit_table(found, regions, members, extent, frozen, closed, eye)
     count = -(-len(layers) // 4)
     packed = np.zeros((len(world), 4 * count), np.float32)
     for k, layer in enumerate(layers):
@@ -313,9 +326,8 @@ def _made(
     )
     batch = geometry.triangle_batch(vertices, corners)
     outward = np.sign(_volume(surface)) if closed else 0.0
-    return _Edited(
-        EditedObject(row, instance, table, float(outward), packed), batch, len(layers), max(one.angle for one in found)
-    )
+    at_hits = EditedObject(row, instance, table, float(outward), packed)
+    return _Edited(at_hits, batch, len(layers), max(one.angle for one in found), eye)
 
 
 def _moved(matrix: np.ndarray, point) -> np.ndarray:

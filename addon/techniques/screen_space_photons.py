@@ -42,6 +42,7 @@ from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters
 from ..lighting.caustic_maps import SEEN, CausticMaps
+from ..lighting.kept_apart import KeptApart
 from ..lighting.path_sources import ShadedLobes
 from ..lighting.photons import FOOTPRINTS, PHOTONS, SPREAD_SIDE, LitView, Photons
 from ..materials import gloss
@@ -102,6 +103,7 @@ class ScreenSpacePhotons(Technique):
         self._photons = Photons()
         self._casters: caustic_casters.Casters | None = None
         self._turns = Turns(self)
+        self._apart = KeptApart()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if settings.bounces < 1:
@@ -127,7 +129,9 @@ class ScreenSpacePhotons(Technique):
             at_once = self._photons.all_at_once(frame, self._casters)
             on_gloss = GLOSS in frame.images and _on_gloss(frame.snapshot, self._casters)
             frame.shared(caustic_casters.Answered).on_gloss = on_gloss
-            self._turns.begin(frame, (LIGHT, GLOSS) if on_gloss else (LIGHT,), at_once)
+            into = (LIGHT, GLOSS) if on_gloss else (LIGHT,)
+            self._apart.begin(frame, tuple(name.removeprefix("radiance.") for name in into))
+            self._turns.begin(frame, into, at_once)
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if self._casters is None or not self._turns.weight(frame):
@@ -140,16 +144,15 @@ class ScreenSpacePhotons(Technique):
         if renews:
             maps.begin(frame, self._photons.resting(frame, self._casters), lasting)
         turn = self._turns.turn(frame) if self._turns.may_rest else None
-        with self._turns.drawing(frame) as drawing:
+        with self._apart.drawing(frame, self), self._turns.drawing(frame) as drawing:
             target = images.Target(tuple(drawing.images(0).values()))
             for light in self._photons.views(frame, self._casters, side, turn, fitted=True):
-                self._add(frame, target, light, maps if renews else None)
-                yield
+                yield from self._add(frame, target, light, maps if renews else None)
             if renews:
                 maps.keep(frame, self)
             drawing.done(0)
 
-    def _add(self, frame: Frame, target: images.Target, light: LitView, maps: CausticMaps | None) -> None:
+    def _add(self, frame: Frame, target: images.Target, light: LitView, maps: CausticMaps | None) -> Iterator[None]:
         """Photons of a light's view, into the picture and into the map that rays ask, where there is one."""
         on_gloss = len(target.colors) > 1
         textures = SURFACE_TEXTURES if on_gloss else SEEN
@@ -163,6 +166,7 @@ class ScreenSpacePhotons(Technique):
         onto_gloss = on_gloss and known and key != caustic_casters.MESHES and _seen_through_glass(frame, light)
         interfaces = frame.settings.get(self, "interfaces")
         for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, onto_gloss):
+            yield
             records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
             splats.draw(
                 splat_program(on_gloss),
@@ -174,6 +178,7 @@ class ScreenSpacePhotons(Technique):
             frame.count(self, "passes")
             if at_hits:
                 into_kept(bundle)
+            yield
 
     def release(self) -> None:
         self._photons.release()

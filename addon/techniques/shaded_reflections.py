@@ -10,14 +10,15 @@ Both a ray and a point may find the same light: they are weighted by the power h
 surface reflects of lamps and the world is left to traced_glossy.py, and what it lets pass of them to
 traced_refraction.py, whose walks by mean colours this technique replaces. Of smooth glass (Glass, and
 Principled's Transmission; roughness up to BOTH_ROUGHNESS) both ways are followed in each sample: what it lets pass,
-and what it mirrors. In pictures of few samples so it is at up to MOST_THROUGH such surfaces behind it, of which one is
-chosen that mirrors. Of other lobes of a surface one is kept, and at what rays have met, too.
+and what it mirrors; so are a thin coat and the lobe below it. In pictures of few samples so it is at up to
+MOST_THROUGH surfaces of glass behind it, of which one is chosen that mirrors. Of other lobes of a surface one is kept,
+and at what rays have met, too.
 
 | cost | per sample and bounce |
 |---|---|
 | rays | 1 per pixel that still has one, 1 to lights, 2 to 4 for light of other surfaces |
 | passes | 4, and 1 for each program of materials (masked by depth) |
-| samples | as many as its share of the picture asks for, each bounce by itself (frame/shares.py) |
+| samples | as many as its share of the picture asks for, each bounce by itself (frame/shares.py); all, through glass |
 | bytes per pixel | 258 while it runs, of the pool |
 
 Rougher lobes than `roughness` see means (instant_radiosity.py), and so do drafts, pictures whose indirect light is not
@@ -52,6 +53,7 @@ from ..lighting.media import LightOfMedia, MediaService, Rays
 from ..lighting.path_sources import SHOWN, SHOWN_THROUGH, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
+from ..materials import gloss
 from ..materials.compiler import least_roughness, may_refract
 from ..scene import acceleration
 from ..scene.materials import SURFACE_IMAGES, may_be_glossy
@@ -67,6 +69,7 @@ from ..surfaces.draw import (
     SURFACE_TEXTURES,
     BothWays,
     goes_both_ways,
+    keeps_coats,
     refracts,
     surface_bindings,
 )
@@ -97,10 +100,11 @@ REACH = (
     ("INT", "rays"),
 )
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
+GATHERED_FROM = 0.4  # roughness from which lobes of the picture are gathered where no material is glass or smooth metal
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
 MOST_THROUGH = 4  # surfaces behind the first of which both ways are followed, as in shaders/hits/path.glsl
 FEWEST_BY_CHANCE = 8  # samples, from which on those are left to chance: an eighth less time at the same error
-BOTH_ROUGHNESS = 0.3  # of glass of which both ways are followed, as in lib/closure.glsl
+BOTH_ROUGHNESS = 0.6  # of glass of which both ways are followed, as in lib/closure.glsl
 LOBE = SURFACE_IMAGES.index("lobe")
 ORDERS = ("direct", "indirect")
 MOST_PARTS = 6  # bounces that have turns of their own (frame/shares.py); later ones have those of the last
@@ -213,7 +217,7 @@ class ShadedReflections(Technique, BothWays):
         Param(
             "roughness", "Roughness", 0.6,
             "Reflections up to this roughness show surfaces with their own materials; rougher ones show each material "
-            "in one average colour, without textures",
+            "in one average colour, without textures; at most 0.4 where no material is glass or smooth metal",
             0.0, 1.0,
         ),
     )  # fmt: skip
@@ -240,6 +244,7 @@ class ShadedReflections(Technique, BothWays):
         self._active = False
         self._first_rays = 0.0
         self._turns = [Turns(self, MOST_PARTS) for _ in range(3)]  # of the ways of glass (hits/scatter.frag.glsl)
+        self._any_ray = True  # whether some lobe has rays
         self._onward = True  # whether rays may go on from what they meet
         self._guides: tuple[str, ...] = (SHOWN,)
         self._into: dict[str, images.Image] = {}  # what this bounce adds to, by name
@@ -263,22 +268,27 @@ class ShadedReflections(Technique, BothWays):
         """Tell the techniques that gather indirect light and walk through glass what this one takes over."""
         self._active = self._follows(frame)
         if self._active:
-            frame.provide(ShadedLobes(frame.settings.get(self, "roughness")))
+            limit = self._roughness(frame)
+            frame.provide(ShadedLobes(limit))
             self._sources.emissive_points = FEW_EMISSIVE_POINTS if frame.settings.samples < FEW else EMISSIVE_POINTS
             self._sources.begin(frame)
             sampled = frame.plan.runs("environment_light")  # of its directions rays of the first lobe leave a share
             of_first = directions_rate(frame).per_sample if sampled else 0.0
             self._first_rays = CANDIDATES * WORLD_DIRECTIONS / of_first if of_first else 0.0
             graphs = [frame.snapshot.materials[slot].graph for slot in frame.snapshot.used_materials]
-            self._onward = any(may_refract(one) or least_roughness(one) <= ONWARD_ROUGHNESS for one in graphs)
-            if not self._onward:
-                frame.account.chose(
-                    self, "rays", f"1 bounce, because no material is smoother than {ONWARD_ROUGHNESS:g}"
-                )
+            smoothest = min((0.0 if may_refract(one) else least_roughness(one) for one in graphs), default=np.inf)
+            self._onward = smoothest <= ONWARD_ROUGHNESS
+            self._any_ray = smoothest <= limit
+            for rays, least in (("1 bounce", ONWARD_ROUGHNESS), ("none", limit)):
+                if smoothest > least:
+                    frame.account.chose(self, "rays", f"{rays}, because no material is smoother than {least:g}")
         self._guides = tuple(name for name in (SHOWN, SHOWN_THROUGH) if name in frame.images)
         guide = self._guides if frame.settings.samples > 1 else ()
-        for turns in self._turns:
-            turns.begin(frame, (*_names(refracts(frame), ORDERS), *guide))
+        # Which surface behind glass mirrors is chance: a bounce that one sample shows nothing of may bring most.
+        by_chance = refracts(frame)
+        names = (*_names(by_chance, ORDERS), *guide)
+        for way, turns in enumerate(self._turns):
+            turns.begin(frame, names, may_rest=way == 1 or not by_chance)
 
     def follows_both_ways(self, frame: Frame) -> bool:
         """Where its rays are in use, glass is smooth, and no edit turns what that mirrors apart from what it bends."""
@@ -286,6 +296,26 @@ class ShadedReflections(Technique, BothWays):
         smooth = any(one.fresnel and one.roughness <= BOTH_ROUGHNESS for one in glass)
         wide = frame.settings.get(self, "roughness") >= BOTH_ROUGHNESS
         return self._follows(frame) and smooth and wide and not frame.plan.runs("reflection_editing")
+
+    def follows_coats(self, frame: Frame) -> bool:
+        """Where its rays are in use, some material has a coat, and no edit turns what that mirrors apart."""
+        coated = any(frame.materials.compiled[slot].coated for slot in frame.snapshot.used_materials)
+        return coated and self._follows(frame) and not frame.plan.runs("reflection_editing")
+
+    def _roughness(self, frame: Frame) -> float:
+        """Up to which lobes are shaded. Those rougher than GATHERED_FROM are calmer if they are gathered with the
+        virtual lights (a bronze of .42: glossy error .0066 to .0003), but then do not see through glass, and what
+        smooth metal mirrors onto them is spread: a floor beside a polished ball had four fifths of it, and bright dots.
+        """
+        roughness = frame.settings.get(self, "roughness")
+        if roughness <= GATHERED_FROM or not frame.plan.fills("indirect") or refracts(frame):
+            return roughness
+        graphs = (frame.snapshot.materials[k].graph for k in frame.snapshot.used_materials)
+        narrow = GATHERED_FROM / 2  # lobes from here on are spread by less than the gathering lobe is wide
+        if any(rough < narrow for graph in graphs for rough in gloss.mirrors(graph)):
+            return roughness
+        frame.account.chose(self, "roughness", f"{GATHERED_FROM:g}, because no material is glass or smooth metal")
+        return GATHERED_FROM
 
     @staticmethod
     def _follows(frame: Frame) -> bool:
@@ -295,11 +325,11 @@ class ShadedReflections(Technique, BothWays):
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
             return
-        both = goes_both_ways(frame)
+        both, coats = goes_both_ways(frame), keeps_coats(frame)
         behind = both and frame.settings.samples < FEWEST_BY_CHANCE
-        turns = self._turns[: 1 + both + behind]
+        turns = self._turns[: 1 + (both or coats) + behind]
         ways = [(way, one) for way, one in enumerate(turns) if one.weight(frame)]
-        if not ways:
+        if not ways or not self._any_ray:
             frame.kept(CausticMaps).done()
             return
         hits, transmission = frame.kept(Hits), refracts(frame)

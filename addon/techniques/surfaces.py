@@ -44,7 +44,7 @@ from ..sampling.lens import rim
 from ..scene.receivers import TILE, Receivers, merged
 from ..scene.view import VIEW
 from ..surfaces.baked import BakedSurface
-from ..surfaces.draw import LEFT_OUT, MARKS, OPAQUE, STOCHASTIC, SURFACES, draw_sample, draw_surfaces, refracts
+from ..surfaces.draw import LEFT_OUT, MARKS, OPAQUE, STOCHASTIC, SURFACES, draw_sample, draw_surfaces, lobes_kept
 
 DESCRIPTIONS = {  # the layout in full: shaders/lib/gbuffer.glsl
     "position": "Position relative to the render origin, m; whether something was hit, and held out",
@@ -138,7 +138,7 @@ class Surfaces(Technique):
                 if frame.snapshot.baked is not None:
                     frame.shared(BakedSurface).draw(frame, self, surfaces)
                 else:
-                    draw_surfaces(frame, self, surfaces, mode, refracts(frame))
+                    draw_surfaces(frame, self, surfaces, mode, lobes_kept(frame))
                 target = images.Target(tuple(images.pool.take(*tiles, "RGBA32F") for _ in range(2)))
                 passes.fullscreen(
                     TILE_BOUNDS,
@@ -171,7 +171,7 @@ def _receivers_key(frame: Frame, modes: tuple[int, ...]) -> tuple:
     return (
         frame.size, modes, frame.snapshot.baked, camera.matrix.tobytes(), camera.kind, camera.frame,
         camera.clip_start, camera.clip_end, camera.aperture, camera.panorama, frame.snapshot.film, settings.seed,
-        settings.schedule.is_draft, refracts(frame),
+        settings.schedule.is_draft, lobes_kept(frame),
         frame.geometry.changes, frame.geometry.origin.tobytes(), frame.materials.fingerprint(),
         tuple(sorted(settings.values.items())), tuple(technique.name for technique in frame.plan.techniques),
         frame.snapshot.own_values,

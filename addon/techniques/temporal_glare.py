@@ -13,7 +13,7 @@ then the same to the bit; what was done is one reduction and one texel read back
 
 | 1024 x 1024, pattern 512, convolved at full size | passes | fetches per pixel |
 |---|---|---|
-| measure | 4 | 1 |
+| measure; its colour where Spectrum is *By Colour* | 4 each | 1 |
 | point spread, when the time or the eye changes | 16 to 18 | (addon/eye/point_spread.py) |
 | scatter | 20 | 2.25 x (1 + 27 + 4 + 27) + 2 |
 
@@ -36,6 +36,7 @@ import numpy as np
 from ..eye import scatter
 from ..eye.aperture import Aperture
 from ..eye.optics import Scale
+from ..eye.spectrum import WHITE
 from ..film.resolve import COMBINED
 from ..frame.picture import Frame
 from ..frame.settings import Settings
@@ -145,7 +146,11 @@ class TemporalGlare(Technique):
         if reason or aperture.light == 0.0:  # lids move, and there is nothing, or nobody, to be dazzled
             frame.count(self, "passes", scatter.dim(picture, target, aperture.light))
         else:
-            kernel = service.kernel(frame, aperture, scale, sharp)
+            colour = WHITE
+            if service.needs_colour(frame):
+                colour = scatter.colour(picture, white)
+                frame.count(self, "passes", scatter.measure_passes(picture))
+            kernel = service.kernel(frame, aperture, scale, sharp, colour)
             how = {"white": white, "strength": strength, "dimming": aperture.light}
             if billboards:
                 done = self._scatter.billboards(picture, kernel, target, **how)

@@ -32,6 +32,7 @@ docs/log/2026-11-26-indirect-light.md.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -59,6 +60,7 @@ from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
+PATHS = ("radiance.transmission_direct", "radiance.transmission_indirect")
 BEHIND = ("reflectance", "interface_table", "behind_position", "behind_albedo", "virtual_lights")
 EMISSIVE = ("emissive_power", "emissive_points", "emissive_level")
 REFRACTION = passes.fullscreen_program(
@@ -115,8 +117,8 @@ class TracedRefraction(Technique):
     reads = SURFACES
     requests = (GatherBindings, MediaService, EditsAtHits)
     writes = (
-        Write("radiance.transmission_direct", "RGBA32F", "Light that arrives through one interface of glass", True),
-        Write("radiance.transmission_indirect", "RGBA32F", "Light that arrives through glass from elsewhere", True),
+        Write(PATHS[0], "RGBA32F", "Light that arrives through one interface of glass", True),
+        Write(PATHS[1], "RGBA32F", "Light that arrives through glass from elsewhere", True),
         Write(SHOWN_THROUGH, "RGBA32F", "What is seen through glass, as reflections show it", True),
     )
 
@@ -137,7 +139,7 @@ class TracedRefraction(Technique):
         frame.kept(Reflectance).update(frame)
         self._sources.begin(frame)
 
-    def sample(self, frame: Frame) -> None:
+    def sample(self, frame: Frame) -> Iterator[None]:
         rows = self._sources.rows(frame)
         hierarchy = frame.hierarchy("transmission")
         bindings = {
@@ -157,23 +159,24 @@ class TracedRefraction(Technique):
                 "clear_roughness": clear_roughness(frame),
             },
         }  # fmt: skip
-        edits = frame.service(EditsAtHits)
-        with edits.entering(bindings["textures"]["surface_lobe"]) if edits is not None else nullcontext():
-            if frame.service(ShadedLobes) is None:
-                self._walk(frame, bindings)
-            else:
-                self._draw(frame, asked(frame, FIRST_ALONE, bindings["textures"]), bindings)
+        if frame.service(ShadedLobes) is None:
+            yield from self._walk(frame, bindings)
+        else:
+            yield from self._draw(frame, asked(frame, FIRST_ALONE, bindings["textures"]), bindings)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
 
-    @staticmethod
-    def _draw(frame: Frame, program: Program, bindings: dict[str, dict]) -> None:
-        target = frame.target("radiance.transmission_direct", "radiance.transmission_indirect")
-        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", **bindings)
+    def _draw(self, frame: Frame, program: Program, bindings: dict[str, dict]) -> Iterator[None]:
+        target, edits = frame.target(*PATHS), frame.service(EditsAtHits)
+        for band in frame.bands(self):
+            with edits.entering(bindings["textures"]["surface_lobe"]) if edits is not None else nullcontext():
+                passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
+            yield
 
-    def _walk(self, frame: Frame, bindings: dict[str, dict]) -> None:
+    def _walk(self, frame: Frame, bindings: dict[str, dict]) -> Iterator[None]:
         """Follow what passes the first interface by walks among means."""
         behind = self._draw_behind(frame)
+        yield
         virtual_lights, near = self._indirect_light(frame)
         bindings["textures"] |= {
             "reflectance": frame.kept(Reflectance).image, "interface_table": self._table,
@@ -183,7 +186,7 @@ class TracedRefraction(Technique):
             "interfaces": frame.settings.get(self, "interfaces"), "emissive_power": self._sources.emissive_power,
             "emissive_points": float(EMISSIVE_POINTS), "emissive_level": frame.shared(EmissiveLevel).value, **near,
         }  # fmt: skip
-        self._draw(frame, REFRACTION, bindings)
+        yield from self._draw(frame, REFRACTION, bindings)
         for image in behind.colors:
             images.pool.give(image)
 

@@ -11,16 +11,15 @@ import bpy
 import numpy as np
 
 from ..eye import optics, point_spread
-from ..eye.aperture import Aperture, aperture_at
 from ..eye.presets import PRESETS
 from ..frame.technique import CAMERA, identifier
 from ..gfx import context as gpu_context
 from ..gfx import images
 from ..gfx.context import turn
 from ..snapshot.camera import camera_of_scene
-from ..techniques.eye import THREE, EyeModel, eye_of
+from ..techniques.eye import THREE, EyeModel, aperture_of
 from ..techniques.temporal_glare import TemporalGlare, degrees_per_pixel
-from . import ENGINE
+from . import ENGINE, shown_images
 from .properties import block_of, settings_of
 from .texts import refusal
 
@@ -101,10 +100,9 @@ def pictures(scene, depsgraph, whole: bool = True) -> tuple[np.ndarray, np.ndarr
     width, height = (max(side * render.resolution_percentage // 100, 1) for side in
                      (render.resolution_x, render.resolution_y))  # fmt: skip
     camera = camera_of_scene(scene, depsgraph, width, height)
-    eye = eye_of(settings)
-    seconds = scene.frame_current_final * render.fps_base / render.fps * settings.get(technique, "speed")
+    seconds = scene.frame_current_final * render.fps_base / render.fps
     # Nothing was measured here: the picture's own mean may differ, and with it an automatic pupil.
-    aperture: Aperture = aperture_at(eye, seconds, settings.get(glare, "luminance") * 0.18)
+    aperture = aperture_of(settings, seconds, settings.get(glare, "luminance") * 0.18)
     side, defocus = technique.sides(settings)[0], settings.get(technique, "defocus")
     scale = optics.scale_of(
         side, degrees_per_pixel(camera, width, height), settings.get(glare, "magnification"), aperture.diameter,
@@ -114,7 +112,7 @@ def pictures(scene, depsgraph, whole: bool = True) -> tuple[np.ndarray, np.ndarr
         pattern = point_spread.make_pattern(
             aperture, side, defocus, settings.get(technique, "wavelengths"),
             planes=settings.get(technique, "planes") == THREE,
-            light=(settings.get(technique, "spectrum"), settings.get(technique, "kelvin")),
+            light=technique.light(settings),
         )  # fmt: skip
         kernel = point_spread.make_kernel(pattern.colours, scale, sharp=not whole)
         weights = images.read(kernel.weights)
@@ -127,15 +125,8 @@ def pictures(scene, depsgraph, whole: bool = True) -> tuple[np.ndarray, np.ndarr
 
 
 def _keep(name: str, pixels: np.ndarray) -> None:
-    """As a float image data-block of the file, in place of one of that name."""
-    height, width = pixels.shape[:2]
-    image = bpy.data.images.get(name)
-    if image is None or not image.is_float:
-        image = bpy.data.images.new(name, width, height, alpha=False, float_buffer=True)
-    if tuple(image.size) != (width, height):
-        image.scale(width, height)
-    image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
-    image.update()
+    """As a float image data-block of the file, in place of the one that was kept before."""
+    image = shown_images.write(name, pixels)
     image.pack()
     preview = image.preview_ensure()
     shown = _as_preview(pixels, 128)
@@ -178,7 +169,7 @@ class CANDELA_CAMERA_PT_eye_pictures(bpy.types.Panel):
         layout.operator_menu_enum("candela.eye_preset", "preset", text="Observers")
         row = layout.row()
         for name in (PUPIL, GLARE):
-            image = bpy.data.images.get(name)
+            image = shown_images.written(name)
             if image is not None and image.preview is not None:
                 row.template_icon(icon_value=image.preview.icon_id, scale=_ICON_SCALE)
         layout.operator("candela.eye_pictures", icon="FILE_REFRESH")

@@ -38,7 +38,8 @@ class CandelaPreferences(bpy.types.AddonPreferences):
     compiles_ahead: bpy.props.BoolProperty(
         name="Compile Shaders in a Second Process",
         description="Let a second Blender without a window compile what a viewport needs, so that this one goes on "
-        "answering. It takes memory for a second copy of the scene, and ends two minutes after the last shader",
+        "answering. It begins when Candela is chosen as the engine, a file that has it is opened, or the extension is "
+        "enabled. It takes memory for a second copy of the scene, and ends two minutes after the last shader",
         default=True,
     )
 

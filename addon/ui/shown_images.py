@@ -5,13 +5,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-OWN = "made_by_candela"  # under which name; a packed image no longer says that it was generated
+OWN = "made_by_candela"  # under which name: an artist's image of that name is left as it is
 
 
 def write(name: str, picture: np.ndarray):
     """The image of this name with the content of `picture`, (H, W, 1 to 4) scene-linear; made if it is not there."""
     height, width = picture.shape[:2]
-    image = _written_before(name)
+    image = written(name)
     if image is None:
         image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
         image[OWN] = name
@@ -28,13 +28,10 @@ def write(name: str, picture: np.ndarray):
     return image
 
 
-def _written_before(name: str):
-    """The image to write anew: the one of this name or, where the artist has another so named, that with a number."""
-    named = bpy.data.images.get(name)
-    if named is not None and named.is_float and (named.source == "GENERATED" or named.get(OWN)):
-        return named
-    numbered = (image for image in bpy.data.images if image.name.startswith(f"{name}.") and image.is_float)
-    return next((image for image in numbered if image.get(OWN) == name), None)
+def written(name: str):
+    """What was written under this name, which ends in a number where the artist has another image so named."""
+    alike = (image for image in bpy.data.images if image.name == name or image.name.startswith(f"{name}."))
+    return next((image for image in alike if image.is_float and image.get(OWN) == name), None)
 
 
 def editor_of(context) -> int:
@@ -50,7 +47,7 @@ def show(context, name: str, picture: np.ndarray, editor: int = 0):
     A new image is a step of its own for undo, since it may come long after the operator that wanted it has been called.
     A data-block that no step knows of would be freed by the next undo under those that point to it.
     """
-    made = _written_before(name) is None
+    made = written(name) is None
     image = write(name, picture)
     if made:
         bpy.ops.ed.undo_push(message=f"Show {name}")

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import os
 import time
-import traceback
 
 import bpy
 import gpu
@@ -29,7 +28,7 @@ from ..snapshot import UnsupportedScene, camera_of_view, take
 from ..snapshot.camera import framed, panoramic_view
 from ..snapshot.errors import unforeseen
 from ..snapshot.images import whole_key
-from ..snapshot.scene import Camera, Snapshot
+from ..snapshot.scene import Camera, Snapshot, one_line
 from ..ui.properties import settings_of
 from ..ui.viewport_pass import shown_pass
 from .ahead import VARIABLE, Ahead
@@ -91,8 +90,7 @@ def draw(engine, context, depsgraph) -> None:
     """Draw the region: add samples, show the picture, and ask for another call until it is complete."""
     viewport = _viewport_of(engine, context, depsgraph)
     region, scene = context.region, depsgraph.scene
-    pixel = pixel_size(scene.render.preview_pixel_size)
-    size = (max(-(-region.width // pixel), 1), max(-(-region.height // pixel), 1))
+    size = size_of(region, scene)
     place = (size, context.region_data.view_perspective)
     if viewport.error and viewport.failed_at != place:  # it may have been this view's, or this size's
         viewport.error = ""
@@ -137,16 +135,11 @@ def _painted(viewport: Viewport) -> bool:
 
 def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int]) -> None:
     space, region_data = context.space_data, context.region_data
-    looks_through = None
-    if region_data.view_perspective == "CAMERA":
-        looks_through = space.camera if space.use_local_camera else depsgraph.scene.camera
-        if looks_through is not None and looks_through.type != "CAMERA":
-            looks_through = None
+    looks_through = looked_through(space, region_data, depsgraph.scene)
     if viewport.dirty:  # which the update does that tells of an eye; to ask all collections in each redraw takes long
-        viewport.closes_eyes = _closes_eyes(depsgraph.view_layer_eval.layer_collection)
-    hidden, shown = _hidden(space, viewport.closes_eyes), None
-    if hidden:
-        shown = lambda shown_object: shown_object.visible_in_viewport_get(space)  # noqa: E731
+        viewport.closes_eyes = closes_eyes(depsgraph.view_layer_eval.layer_collection)
+    hidden = hidden_in(space, viewport.closes_eyes)
+    shown = shown_in(space, hidden)
     if viewport.hidden != hidden:
         viewport.hidden = hidden
         viewport.dirty = True
@@ -170,7 +163,6 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         _fail(viewport, engine, str(error))
     except Exception as error:
         # An error of Candela's own. Raised further it would come again with every redraw.
-        traceback.print_exc()
         _fail(viewport, engine, unforeseen(error))
     finally:
         gpu.state.blend_set(blend)
@@ -178,19 +170,38 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         gpu.state.depth_mask_set(depth_mask)
 
 
+def size_of(region, scene) -> tuple[int, int]:
+    """Width and height of a region's picture, in pixels."""
+    pixel = pixel_size(scene.render.preview_pixel_size)
+    return max(-(-region.width // pixel), 1), max(-(-region.height // pixel), 1)
+
+
+def looked_through(space, region_data, scene):
+    """The camera object that a region looks through; None: a view of its own."""
+    if region_data.view_perspective != "CAMERA":
+        return None
+    camera = space.camera if space.use_local_camera else scene.camera
+    return camera if camera is not None and camera.type == "CAMERA" else None
+
+
+def shown_in(space, hidden: tuple[str, ...]):
+    """Predicate on objects: whether a region shows one; None where it hides nothing (`hidden_in`)."""
+    return (lambda shown_object: shown_object.visible_in_viewport_get(space)) if hidden else None
+
+
 _KINDS = [p.identifier for p in bpy.types.SpaceView3D.bl_rna.properties if p.identifier.startswith("show_object_view")]
 
 
-def _hidden(space, closes_eyes: bool) -> tuple[str, ...]:
+def hidden_in(space, eyes_closed: bool) -> tuple[str, ...]:
     """Names of what the region's own settings hide: other than in local view or in its collections, and kinds; and
     whether the eye of a collection is closed, whose objects Blender lists nevertheless."""
     own = [name for name in ("local_view", "use_local_collections") if getattr(space, name, None)]
     kinds = [name for name in _KINDS if not getattr(space, name, True)]
-    return (*own, *kinds, *(("collections",) if closes_eyes else ()))
+    return (*own, *kinds, *(("collections",) if eyes_closed else ()))
 
 
-def _closes_eyes(layer_collection) -> bool:
-    return any(one.hide_viewport or _closes_eyes(one) for one in layer_collection.children)
+def closes_eyes(layer_collection) -> bool:
+    return any(one.hide_viewport or closes_eyes(one) for one in layer_collection.children)
 
 
 def render_border(depsgraph, space, view: Camera, looks_through, size: tuple[int, int]):
@@ -234,7 +245,7 @@ def _fail(viewport: Viewport, engine, sentence: str) -> None:
     """Stop drawing until the scene changes; the sentence stands in the region, and once in Blender's reports."""
     viewport.drop()
     if viewport.reported != sentence:
-        engine.report({"ERROR"}, sentence)
+        engine.report({"ERROR"}, one_line(sentence))
     viewport.error = viewport.reported = sentence
 
 

@@ -13,11 +13,12 @@ import pickle
 import queue
 import sys
 import threading
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 FIRST_SCALE = 8  # as of a viewport that has drawn nothing yet
-FULL_SCALE = 2  # a picture in full resolution has the same programs as one in coarser pixels
+FULL_SCALE = 2  # a picture in full resolution has the programs of one in coarser pixels that cost as much
 SAMPLES = 2  # the second one has passes of its own
 IDLE_S = 120.0
 
@@ -82,10 +83,11 @@ def main() -> None:
         for stage in ("draft", "full"):
             lasting = True
             try:
-                for left, at in drawn(renderer, looks, order, stage):
-                    tell(left=left, at=at, compiled=library.compile_count - before)
-                    if not orders.empty():
-                        break
+                with costs_of(stage):
+                    for left, at in drawn(renderer, looks, order, stage, tell):
+                        tell(left=left, at=at, compiled=library.compile_count - before)
+                        if not orders.empty():
+                            break
             except Exception as error:  # the picture itself will say so
                 lasting = False
                 print(f"Candela, compiling ahead: {error}", file=sys.stderr)
@@ -94,29 +96,32 @@ def main() -> None:
             tell(done=stage, lasting=lasting)
 
 
-def drawn(renderer, looks, order, stage: str):
+def drawn(renderer, looks, order, stage: str, tell=lambda **_: None):
     """Draw an order's picture as a draft or in full; yields after each part how many programs are left, as far as
-    known, and what technique they are for, where they are compiled as they are met."""
-    images, library, scene_view, begun = map(own, ("gfx.images", "gfx.library", "scene.view", "viewport.beginning"))
+    known, and what technique they are for, where they are compiled as they are met. Of a picture that is foreseen the
+    first look comes first, and what it needs is told."""
+    images, library, begun, ahead = map(own, ("gfx.images", "gfx.library", "viewport.beginning", "viewport.ahead"))
     coarser = begun.coarser
     whole, settings = order["snapshot"], order["settings"]
     draft = stage == "draft"
     scale = FIRST_SCALE if draft else FULL_SCALE
     snapshot = replace(whole, film=coarser(whole.film, scale))
     settings = replace(settings, samples=max(settings.samples, SAMPLES))
+    looks = looks if draft and snapshot.camera.panorama is None else ()  # edges and shapes of drafts
     beginning = renderer.beginning(snapshot, begun.drawn_with(settings, scale if draft else 1, waits=not draft))
+    placed = False
     while True:
         try:
             done, total = next(beginning)
         except StopIteration as end:
             frame = end.value
             break
+        if not placed and order["foreseen"]:  # in full, too: the draft may have failed before
+            look_at(renderer, looks, snapshot, coarser(whole.film, scale // 2))
+            tell(needs=ahead.digests_of(renderer, whole, order["settings"]))
+        placed = True
         yield max(total - done, 1), ""
-    if draft:  # edges and shapes of drafts
-        view = scene_view.View(snapshot.camera, coarser(whole.film, scale // 2), renderer.geometry.origin)
-        for look, guides in zip(looks, (False, True)):
-            if snapshot.camera.panorama is None:
-                look.draw(snapshot, renderer.geometry, renderer.materials.compiled, view, guides=guides)
+    look_at(renderer, looks, snapshot, coarser(whole.film, scale // 2))
     for _ in range(1 if draft else SAMPLES):
         known = library.news()
         for _ in renderer.steps(frame):
@@ -124,9 +129,33 @@ def drawn(renderer, looks, order, stage: str):
                 known = library.news()
                 yield 1, frame.at
         shown = renderer.show(frame)
-        if draft and shown is not None and snapshot.camera.panorama is None:
-            looks[1].refined(shown, snapshot.film.exposure)
+        for look in looks[1:] if shown is not None else ():
+            look.refined(shown, snapshot.film.exposure)
     images.finish()
+
+
+@contextmanager
+def costs_of(stage: str):
+    """Choices by cost, as of maps and rays, are those of the picture that is drawn for, which has more pixels in full:
+    of other methods it has other programs."""
+    device = own("gfx.device")
+    costs = device.current()
+    if stage == "draft" or not device.known():  # drafts have no such choices
+        yield
+        return
+    device.use(costs.of_dearer_pixels(FULL_SCALE**2))
+    try:
+        yield
+    finally:
+        device.use(costs)
+
+
+def look_at(renderer, looks, snapshot, film) -> None:
+    """Draw first looks at what is placed."""
+    scene = snapshot, renderer.geometry, renderer.materials.compiled
+    view = own("scene.view").View(snapshot.camera, film, renderer.geometry.origin)
+    for k, look in enumerate(looks):
+        look.draw(*scene, view, guides=k > 0)
 
 
 if __name__ == "__main__":

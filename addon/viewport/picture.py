@@ -231,10 +231,10 @@ class Viewport:
             self._sample, self._sample_seconds = self.renderer.steps(frame), self._begun_s
             self._begun_s = 0.0
             self._news = library.news()
-        before, end, compiled = clock(), object(), library.compile_count
+        before, end, compiled, uses = clock(), object(), library.compile_count, library.first_uses
         whole = next(self._sample, end) is end
-        if whole and not frame.profiler.wait:
-            images.finish()
+        if (whole or library.first_uses != uses) and not frame.profiler.wait:
+            images.finish()  # some drivers compile where the GPU draws, which a redraw that goes on has to know
         spent = clock() - before
         self.bands.learn(spent, budget / 2)
         self._sample_seconds += spent

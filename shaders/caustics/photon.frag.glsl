@@ -13,11 +13,15 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "caustics/emission.glsl"
+#include "indirect/mirror_color.glsl"
 #ifdef ABSORBING
+vec3 solid_absorbs(int material)
+{
+  return interface_table_fetch(ivec2(2, material)).rgb;
+}
 #include "trace/solid.glsl"
 #endif
 
-#define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
 #define PATHS 8192.0
 
 // Fractional parts of multiples of two irrational numbers: other numbers for each interface, the same for all photons. In
@@ -71,16 +75,6 @@ bool interface_of(int material, vec3 flux, float number, inout vec4 glass, inout
   }
   scale = vec3(shape.y * left / max(chance * part, 1e-30));
   return true;
-}
-
-// What a smooth mirror behind the first interface reflects, by the means of its material.
-vec3 mirror_color(int material, float cosine)
-{
-  ivec2 place = ivec2(material & 15, material >> 4);
-  int rows = reflectance_size().y / REFLECTANCE_BANDS;
-  vec3 straight = reflectance_fetch(place + ivec2(0, 2 * rows)).rgb;
-  vec3 grazing = reflectance_fetch(place + ivec2(0, 3 * rows)).rgb;
-  return mix(straight, grazing, pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0));
 }
 
 #ifdef PATTERNED
@@ -195,8 +189,7 @@ void main()
     }
 #endif
 #ifdef ABSORBING
-    int solid = (leaves && shape.y > 0.0) ? material : solid_around(origin, onward, ray_offset(origin), salt + uint(step));
-    flux *= (solid >= 0) ? exp(-interface_table_fetch(ivec2(2, solid)).rgb * t) : vec3(1.0);
+    flux *= exp(-t * solid_absorption(origin, onward, t, hit, leaves, ray_offset(origin), salt + uint(step)));
 #endif
     if (!is_glass && !mirrors) {
       // The end.

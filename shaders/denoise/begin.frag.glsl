@@ -6,6 +6,15 @@
 #include "lib/closure.glsl"
 #endif
 
+// Sums of light without what is left as it is (APART: lighting/kept_apart.py).
+#ifdef APART
+#define SUM_NOW(pixel) (sum_now_fetch(pixel).rgb - apart_sum_fetch(pixel).rgb)
+#define HALF_SUM(pixel) (half_sum_fetch(pixel).rgb - apart_half_fetch(pixel).rgb)
+#else
+#define SUM_NOW(pixel) (sum_now_fetch(pixel).rgb)
+#define HALF_SUM(pixel) (half_sum_fetch(pixel).rgb)
+#endif
+
 vec3 without_color(vec3 light, ivec2 pixel)
 {
 #if defined(OF_MEDIA) || defined(THROUGH_GLASS)
@@ -17,7 +26,7 @@ vec3 without_color(vec3 light, ivec2 pixel)
 
 float half_difference(ivec2 pixel, vec3 whole)
 {
-  vec3 first = half_sum_fetch(pixel).rgb;
+  vec3 first = HALF_SUM(pixel);
   float n = float(count);
   float m = float(half_count);
   float difference = luminance(without_color(first / m - (whole - first) / (n - m), pixel));
@@ -28,7 +37,7 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = sum_now_size();
-  vec3 whole = sum_now_fetch(pixel).rgb;
+  vec3 whole = SUM_NOW(pixel);
   out_light = vec4(without_color(whole / float(count), pixel), -1.0);
 #ifdef GRASS
   if (int(floor(surface_lobe_fetch(pixel).z / 2097152.0)) == SURFACE_GRASS) {
@@ -52,7 +61,7 @@ void main()
       Shown there;
       if (shown_at(place, there)) {
         float weight = alike(here, there, 1);
-        sum += weight * half_difference(place, sum_now_fetch(place).rgb);
+        sum += weight * half_difference(place, SUM_NOW(place));
         weights += weight;
       }
     }

@@ -8,6 +8,10 @@ void main()
   out_sum = vec4((light.a < 0.0) ? sum.rgb : light.rgb * float(count), sum.a);
 #else
   vec4 color = color_sum_fetch(pixel);
-  out_sum = (light.a < 0.0) ? sum : vec4(light.rgb * max(color.rgb, vec3(LEAST_COLOR * float(count))), sum.a);
+  vec3 filtered = light.rgb * max(color.rgb, vec3(LEAST_COLOR * float(count)));
+#ifdef APART
+  filtered += apart_sum_fetch(pixel).rgb;
+#endif
+  out_sum = (light.a < 0.0) ? sum : vec4(filtered, sum.a);
 #endif
 }

@@ -9,6 +9,7 @@
 #include "neighbours/pixel_size.glsl"
 
 #define REACH 4  // pixels to look at, on each side: until some have light (wires)
+#define COATED 16  // beside a kind of lobe: with a coat above it
 #define LEAST_COLOR 1e-5  // what is darker tells nothing of the light that arrives
 
 struct Seen {
@@ -50,6 +51,11 @@ Seen seen_of(Surface s)
   seen.soft = max_component(s.glossy_weight) > 0.0 && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
   seen.color = max(s.diffuse, vec3(0.0)) + (seen.soft ? s.glossy_weight : vec3(0.0));
   seen.weight = seen.soft ? vec3(0.0) : s.glossy_weight * lobe_reflectance(s);
+  if (s.coated) {
+    // What two lobes reflect together no colour tells: it is taken over as it is, of other such pixels.
+    seen.kind += COATED;
+    seen.weight = vec3(1.0);
+  }
   seen.mirror = vec3(0.0);
 #ifdef TRANSMISSION
   if (surface_goes_both_ways(s)) {

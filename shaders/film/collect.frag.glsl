@@ -69,6 +69,14 @@ void main()
       }
     }
 #endif
+#ifdef GLOSSY
+    if (s.coated) {
+      Surface coat = surface_coat(s);
+      out_glossy_color.rgb += coat.glossy_weight *
+                              glossy_albedo(coat.kind, coat.glossy_tint, coat.glossy_edge, coat.glossy_ior, coat.glossy_roughness,
+                                            max(dot(coat.glossy_normal, -direction), 0.0));
+    }
+#endif
     if (max_component(s.diffuse) <= 0.0 && max_component(s.glossy_weight) > 0.0) {
       out_normal.xyz = s.glossy_normal;
     }
@@ -77,7 +85,8 @@ void main()
 #ifdef WORLD
     out_environment.rgb = (world_light.color.w > 0.5) ? environment_radiance(direction) * s.emission : vec3(0.0);
 #endif
-    coverage = 1.0 - world_light.map_options.x;
+    // What layers take away covers, too.
+    coverage = 1.0 - world_light.map_options.x * dot(s.emission, vec3(1.0 / 3.0));
   }
   else {
     coverage = 1.0;  // beside a fisheye's circle Cycles has black, which is no hole in a transparent film either

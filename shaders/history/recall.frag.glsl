@@ -18,7 +18,7 @@
 struct Found {
   vec3 direct;
   vec3 indirect;
-  vec2 counts;  // samples that stand behind both
+  vec2 counts;  // samples that stand behind both; in parts, where only a part of the place shows the surface
   float weight;
 };
 
@@ -74,7 +74,6 @@ Found recall(vec3 position, vec3 normal, float tolerance)
   if (found.weight > 0.05) {
     found.direct /= found.weight;
     found.indirect /= found.weight;
-    found.counts /= found.weight;
   }
   else {
     found.weight = 0.0;

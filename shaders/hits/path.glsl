@@ -3,7 +3,7 @@
 #define PATH_TRANSMISSION 2  // or bends it
 #define PATH_BENT 4          // added where the last surface did so
 #define PATH_CLEAR 8         // added where all surfaces so far were clear glass that let it pass (Film > Transparent Glass)
-#define PATH_PHOTONS 8        // of glossy paths: the first lobe takes photons (caustics/gloss.glsl), and glass alone is behind it so far
+#define PATH_PHOTONS 8        // the same bit, of glossy paths: the first lobe takes photons (caustics/gloss.glsl), and glass alone is behind it so far
 #define PATH_EDITED 16       // added until it leaves a closed object whose edit turns what leaves it
 #define PATH_MIRROR 32       // added for each surface so far that mirrored it
 #define PATH_THROUGH 0.25     // added as long as glass that goes both ways has let it pass; alone: another way adds the light

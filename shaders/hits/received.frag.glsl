@@ -19,6 +19,7 @@ struct Receiver {
   bool bends;
   bool within;     // glass mirrors, whose rays bend where light samples would pass straight
   bool followed;   // by a ray
+  bool turned;     // by an edit where it leaves glass: rays alone find what is there
   bool ended;      // would be, but for the number of bounces: shows nothing
   int group;       // of receivers
   int mirrored;    // by so many surfaces on the way to the camera
@@ -47,7 +48,7 @@ vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, flo
   }
 #endif
   if (r.followed && density > 0.0) {
-    of_lobe *= power_share(light.rate * density, lobe_density);
+    of_lobe *= r.turned ? 0.0 : power_share(light.rate * density, lobe_density);
   }
   sum += of_lobe;
 #ifdef SOFT_LOBES
@@ -140,8 +141,8 @@ vec3 indirect_light(Receiver r, uvec3 roll)
   vec3 arriving = virtual_irradiance(position, lit, glossy_radius, r.mirrored > 0, roll.z, from);
   sum += arriving * reflection_of(reflection, lit, from, r.viewer);
   Walk walk;
-  walk.direction = cosine_direction(lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-  vec3 weight = PI * reflection_of(reflection, lit, walk.direction, r.viewer);
+  vec3 weight;
+  walk.direction = reflection_sample(reflection, lit, r.viewer, vec2(to_unit(roll.x), to_unit(roll.y)), weight);
   if (dot(walk.direction, side) > 0.0 && max_component(weight) > 0.0) {
     walk.origin = ray_origin(position, side);
     walk.bounce = 1;
@@ -182,6 +183,7 @@ void main()
   r.within = mirrors_within(r.surface);
   r.followed = has_lobe && goes_on && ray_number + 1 < rays
                && (r.bends ? ray_number < interfaces : r.mirrored < mirrors);
+  r.turned = path_is_edited(code) && r.bends && r.surface.glossy_ior <= 1.0;
   r.ended = has_lobe && goes_on && !r.followed;
   r.lobe = lobe_begin(r.surface, r.viewer);
   r.shines = r.shines && !lobe_is_mirror(r.lobe);

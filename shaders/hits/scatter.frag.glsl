@@ -4,7 +4,7 @@
 // Of smooth glass, one surface behind the other from the camera on, each way is a pass of its own (`way`): 0 goes through
 // all of them, 1 is mirrored by the first, 2 by one of the others, drawn by mirror_depth. On their way to that one, rays of
 // way 2 add no light: way 0 has it. So what few samples see through panes and bodies of glass is no matter of chance;
-// pictures of many samples go without way 2 and leave it to chance.
+// pictures of many samples go without way 2 and leave it to chance. Way 1 is that of thin coats above other lobes, too.
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
@@ -42,14 +42,14 @@ void main()
   Surface s = SURFACE_READ(pixel);
   bool both = surface_goes_both_ways(s);
 #ifndef ONWARD
-  bool takes_photons = photons_shine != 0 && gloss_takes_photons(s);  // none end on glass, whichever way it goes
+  bool takes_photons = photons_shine != 0 && way == 0 && gloss_takes_photons(s);  // none end on glass, whichever way it goes
 #endif
 #ifndef ONWARD
-  if (way != 0) {  // of glass that goes both ways; the other way all lobes go
-    if (!both) {
+  if (way != 0) {  // of glass that goes both ways, and of coats; the other way all lobes go
+    if (!both && !(way == 1 && s.coated)) {
       return;
     }
-    s = (way == 1) ? surface_mirrored(s) : s;
+    s = (way == 1) ? (both ? surface_mirrored(s) : surface_coat(s)) : s;
   }
 #endif
 #ifdef ONWARD
@@ -152,6 +152,7 @@ void main()
       direction = quaternion_turned(edit / max(length(edit), 1e-30), direction);
       edited = false;
       enters = dot(direction, s.geometric_normal) > 0.0;
+      density = 0.0;  // light samples leave that out, too (hits/received.frag.glsl)
     }
 #endif
     code += (edited ? PATH_EDITED : 0);
@@ -165,6 +166,7 @@ void main()
     code += PATH_MIRROR + (edited ? PATH_EDITED : 0);
 #ifndef ONWARD
     density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
+    density = (enters_itself(s, direction) && density != FOUND_ELSEWHERE) ? 0.0 : density;  // light samples leave that out
     code += takes_photons ? PATH_PHOTONS : 0;
 #endif
   }

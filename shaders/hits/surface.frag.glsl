@@ -19,7 +19,7 @@
 #define LEAST_MIRRORED 0.05
 // `glass_bends`: 2 and 4 keep smooth glass as one lobe of both ways; 3 and 4 frosted glass that is seen from within
 // (hits/onward.glsl). add_glass asks for either where its roughness `r` is at most this:
-#define SMOOTH_UP_TO 0.3  // BOTH_ROUGHNESS in lib/closure.glsl
+#define SMOOTH_UP_TO 0.3  // rougher ones are followed both ways by the camera alone (lib/closure.glsl)
 #define FROSTED_FROM 0.1  // as in hits/onward.glsl
 #undef BOTH_ROUGHNESS
 #define BOTH_ROUGHNESS 1.0

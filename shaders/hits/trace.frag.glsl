@@ -13,6 +13,10 @@
 #include "trace/own_solid.glsl"
 #include "hits/shared.glsl"
 #ifdef ABSORBING
+vec3 solid_absorbs(int material)
+{
+  return hit_materials_fetch(ivec2(material & 255, material >> 8)).rgb;
+}
 #include "trace/solid.glsl"
 #endif
 
@@ -70,16 +74,9 @@ void main()
   out_passed.w = emissive_density(emission, emissive_level) * t * t / max(abs(dot(normal, direction)), 1e-6);
   vec3 outwards = (dot(normal, shading) < 0.0) ? -normal : normal;
 #ifdef ABSORBING
-  vec3 absorbed = vec3(0.0);
-  if (dot(outwards, direction) > 0.0) {
-    absorbed = hit_materials_fetch(ivec2(material_index & 255, material_index >> 8)).rgb;
-  }
-  if (max_component(absorbed) <= 0.0) {
-    float offset = max(offset_size, 2e-5 * distance(start.xyz, film_view.eye.xyz));
-    int solid = solid_around(start.xyz, direction, offset, roll.x);
-    absorbed = (solid >= 0) ? hit_materials_fetch(ivec2(solid & 255, solid >> 8)).rgb : vec3(0.0);
-  }
-  out_passed.rgb *= exp(-absorbed * t);
+  bool leaves = dot(outwards, direction) > 0.0;
+  float offset = max(offset_size, 2e-5 * distance(start.xyz, film_view.eye.xyz));
+  out_passed.rgb *= exp(-t * solid_absorption(start.xyz, direction, t, hit, leaves, offset, roll.x));
 #endif
   out_material = float(material_index);
   gl_FragDepth = shared_depth(material_index);

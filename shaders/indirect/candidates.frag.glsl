@@ -39,9 +39,15 @@ void main()
   for (int bounce = 1; bounce <= max(bounces, 1) && max_component(throughput) > 1e-4; bounce++) {
     if (bounce > 1) {
       roll = hash3(roll);
-      vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-      vec3 reflected = even_share(met) * PI * reflection_of(met.reflection, met.lit, onward, -direction);
+      vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));
+      vec3 onward = cosine_direction(met.lit, u);
+      vec3 reflected = PI * reflection_of(met.reflection, met.lit, onward, -direction);
       vec3 diffuse = even_share(met) * met.reflection.diffuse;
+      // Neighbours share the next surfaces as the cosine finds them; those after follow the lobe.
+      for (bool further = bounce > 2; further; further = false) {
+        onward = reflection_sample(met.reflection, met.lit, -direction, u, reflected);
+      }
+      reflected *= even_share(met);
       if (bounce == 2) {
         // What neighbours share is the part below albedo: rough surfaces reflect less than that to most directions.
         lobe = max(reflected - diffuse, vec3(0.0));

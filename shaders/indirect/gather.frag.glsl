@@ -15,6 +15,13 @@ void main()
   out_diffuse = vec4(0.0);
   out_glossy = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
+#ifdef INTERLEAVED
+  // One pixel of each rectangle (addon/sampling/interleaved.py).
+  pixel = pixel * rectangle + place_within;
+  if (any(greaterThanEqual(pixel, surface_position_size()))) {
+    return;
+  }
+#endif
   if (surface_position_fetch(pixel).w == 0.0) {
     return;
   }

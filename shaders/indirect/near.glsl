@@ -59,9 +59,10 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       throughput *= deeper;
     }
     roll = hash3(roll);
-    vec3 onward = cosine_direction(walk.met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= even_share(walk.met) * PI * reflection_of(walk.met.reflection, walk.met.lit, onward, -walk.direction);
-    walk.direction = onward;
+    vec3 reflected;
+    vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));
+    walk.direction = reflection_sample(walk.met.reflection, walk.met.lit, -walk.direction, u, reflected);
+    throughput *= even_share(walk.met) * reflected;
     walk.origin = ray_origin(lit_position(walk.met), walk.met.lit);
   }
   return sum;

@@ -28,13 +28,39 @@
 #define BOTH_GREY (112.0 / 127.0)
 #define BOTH_STEPS 16383.0
 #define BOTH_MOST 4.0        // the largest share
-#define BOTH_ROUGHNESS 0.3   // of glass that is kept so
+#define BOTH_ROUGHNESS 0.6   // of glass that is kept so
 
 vec3 both_ways_edge(float share, bool colored)
 {
   float code = floor(clamp(share / BOTH_MOST, 0.0, 1.0) * BOTH_STEPS + 0.5);
   float high = floor(code / 128.0);
   return vec3(colored ? BOTH_COLORED : BOTH_GREY, high / 127.0, (code - 128.0 * high) / 127.0);
+}
+
+// A thin clear coat may be kept beside the lobe below it, so that no sample lacks either of the two: in the numbers of that
+// one's edge, where it is white. x: roughness and index, in steps; y, z: high and low part of the coat's weight, in shares
+// of the lobe's.
+#define COAT_ROUGHNESS_STEP 0.01
+#define COAT_ROUGHNESSES 16.0
+#define COAT_IOR_LEAST 1.3
+#define COAT_IOR_STEP 0.05
+#define COAT_IORS 8.0
+#define COAT_MOST 8.0  // the largest share
+
+bool coat_is_thin(float roughness, float ior)
+{
+  float place = (ior - COAT_IOR_LEAST) / COAT_IOR_STEP;
+  bool known = abs(place - floor(place + 0.5)) < 0.02 && place > -0.5 && place < COAT_IORS - 0.5;
+  return known && roughness < (COAT_ROUGHNESSES - 0.5) * COAT_ROUGHNESS_STEP;
+}
+
+vec3 coat_encode(float share, float roughness, float ior)
+{
+  float rough = floor(roughness / COAT_ROUGHNESS_STEP + 0.5);
+  float index = floor((ior - COAT_IOR_LEAST) / COAT_IOR_STEP + 0.5);
+  float code = floor(clamp(share / COAT_MOST, 0.0, 1.0) * BOTH_STEPS + 0.5);
+  float high = floor(code / 128.0);
+  return vec3(rough + COAT_ROUGHNESSES * index, high, code - 128.0 * high) / 127.0;
 }
 
 float dielectric_f0(float ior)
@@ -100,6 +126,8 @@ struct Closures {
   vec3 glossy_tangent;
   vec3 glossy_normal;
   int distribution;       // of the lobe's microfacets: DISTRIBUTION_*
+  vec4 coat;              // beside that lobe (coat_encode): weight, roughness, ior, importance; 0: none
+  vec3 coat_normal;
   float glossy_sum;       // reservoir state
   float glossy_count;
   float glossy_chance;    // that the lobe that is kept was to be
@@ -153,6 +181,8 @@ Closures closures_begin(vec3 normal, float random_number, float even_share)
   c.glossy_tangent = vec3(0.0);
   c.glossy_normal = normal;
   c.distribution = DISTRIBUTION_MULTI_GGX;
+  c.coat = vec4(0.0);
+  c.coat_normal = normal;
   c.glossy_sum = 0.0;
   c.glossy_count = 0.0;
   c.glossy_chance = 1.0;
@@ -192,7 +222,11 @@ void closure_diffuse(inout Closures c, vec3 weight, vec3 color, float roughness,
   vec3 albedo = weight * color;
   // Weights near the end of float32 add up to infinity, of which there is no share.
   float added = min(dot(useful_color(c, albedo), vec3(1.0)), 1e30);
-  if (!(added > 0.0)) {
+  bool below = dot(normal, c.base_normal) < 0.0;  // a map has turned it there, where in Cycles no light reaches it
+#ifdef SUBSURFACE
+  below = below && dot(c.scatter, vec3(1.0)) == 0.0;
+#endif
+  if (!(added > 0.0) || below) {
     return;
   }
   float total = min(c.diffuse_sum + added, 1e30);
@@ -285,6 +319,7 @@ vec3 finite_or_black(vec3 color)
 // The chance with which a layer lets the rays of a sample pass, and the share of the light that does, grey. Where a lobe is
 // added to what lets all pass both are more than 1 together: the layer is then drawn as often as they are to each other,
 // and who passes it carries the more light (LEAST_DRAWN: of a faint lobe too, or its highlights were few and bright).
+// `colored`: what passes is given the layer's colour over this chance. A layer that has no more than that lets all pass.
 #define LEAST_DRAWN 0.25
 
 float layer_share(Closures c)
@@ -292,9 +327,14 @@ float layer_share(Closures c)
   return clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
 }
 
-float layer_chance(Closures c)
+float layer_chance(Closures c, bool colored)
 {
   float through = layer_share(c);
+#if defined(LAYER_COLORS) && !defined(OWN_CLOSURES)
+  if (colored && through > 0.0 && c.diffuse_sum + c.glossy_sum + c.holdout <= 0.0) {
+    return 1.0;
+  }
+#endif
 #ifdef ADDED_LOBES
   float drawn = c.diffuse_sum / 3.0 + c.glossy_sum;
   if (drawn > 0.0 && through + drawn > 1.001) {
@@ -304,8 +344,26 @@ float layer_chance(Closures c)
   return through;
 }
 
+// The coat stays beside the lobe that is kept, where that leaves room for it; else it is one lobe more to choose from.
+void coat_end(inout Closures c)
+{
+  vec4 coat = c.coat;
+  bool white = c.kind != FRESNEL_F82 || min(min(c.glossy_edge.x, c.glossy_edge.y), c.glossy_edge.z) > 0.997;
+  vec3 kept = finite_or_black(c.glossy_weight / max(c.glossy_chance, 1e-30));
+  float share = coat.x / max(max(max(kept.x, kept.y), kept.z), 1e-30);
+  if (c.kind <= FRESNEL_F82 && white && share < COAT_MOST && dot(c.coat_normal, c.glossy_normal) > 0.9999) {
+    return;
+  }
+  c.coat = vec4(0.0);
+  closure_glossy(c, vec3(coat.x), coat.w, FRESNEL_DIELECTRIC, vec3(dielectric_f0(coat.z)), vec3(1.0), coat.z, coat.y, 0.0,
+                 vec3(0.0), c.coat_normal);
+}
+
 void closures_end(inout Closures c)
 {
+  if (c.coat.x > 0.0) {
+    coat_end(c);
+  }
   if (c.diffuse_apart) {
     c.diffuse *= c.diffuse_sum / c.diffuse_kept;
     c.diffuse_weight *= c.diffuse_sum / c.diffuse_kept;

@@ -6,7 +6,7 @@
 //   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each
 //   tint      weight of the lobe; w: square root of its reflectance at normal incidence, 8 bits each
 //   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each), of glass
-//             what both_ways_edge says; w: ior, below 0
+//             what both_ways_edge says; below 0, less 1, where the edge is that of coat_encode; w: ior, below 0
 //             for distributions other than GGX with multiple scattering
 //   emission  radiance; w: roughness of the lobe; of a translucent one, which has none, how far below (smooth_lift)
 //
@@ -41,6 +41,8 @@ struct Surface {
   float tangent_angle;    // of the tangent in the frame of orthonormal_basis(glossy_normal), 0..1 half turns
   vec3 glossy_normal;
   int distribution;       // of the lobe's microfacets: DISTRIBUTION_*
+  bool coated;            // a thin coat lies above the lobe (surface_coat)
+  vec3 coat;              // as of coat_encode
 #ifdef HAS_SURFACE_EDIT
   vec4 edit;              // quaternion that turns its frame (edit/); 0: none
   bool edit_solid;        // whether the edited object is closed
@@ -196,9 +198,15 @@ bool soft_lobe_is_glossy(Surface s)
   return s.kind == LOBE_VELVET || (s.kind == LOBE_TOON && s.glossy_edge.x > 0.5);
 }
 
+// Kind and edge of a lobe, without what says that it has a coat.
+float lobe_code(vec4 lobe)
+{
+  return (lobe.z < 0.0) ? -lobe.z - 1.0 : lobe.z;
+}
+
 int lobe_kind(vec4 lobe)
 {
-  return int(floor(lobe.z / 2097152.0));
+  return int(floor(lobe_code(lobe) / 2097152.0));
 }
 
 Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4 lobe, vec4 emission)
@@ -228,7 +236,9 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   s.glossy_weight = tint.xyz;
   s.glossy_normal = octahedral_decode(lobe.xy);
   s.kind = lobe_kind(lobe);
-  s.glossy_edge = unpack_three(lobe.z - float(s.kind) * 2097152.0, 127.0);
+  s.coated = lobe.z < 0.0;
+  s.coat = unpack_three(lobe_code(lobe) - float(s.kind) * 2097152.0, 127.0);
+  s.glossy_edge = s.coated ? vec3(1.0) : s.coat;
   s.glossy_ior = abs(lobe.w);
   s.distribution = (lobe.w < 0.0) ? int(s.glossy_ior / OTHER_DISTRIBUTION) : DISTRIBUTION_MULTI_GGX;
   s.glossy_ior = (s.distribution > DISTRIBUTION_MULTI_GGX) ? 1.5 : s.glossy_ior;
@@ -296,6 +306,24 @@ Surface surface_mirrored(Surface s)
     s.edit *= float(s.edit_mirrored);
 #endif
   }
+  return s;
+}
+
+// The surface with its coat as its lobe, where it is coated.
+Surface surface_coat(Surface s)
+{
+  float code = floor(s.coat.x * 127.0 + 0.5);
+  float index = floor(code / COAT_ROUGHNESSES);
+  float share = floor(s.coat.y * 127.0 + 0.5) * 128.0 + floor(s.coat.z * 127.0 + 0.5);
+  s.glossy_weight = vec3(share * (COAT_MOST / BOTH_STEPS) * max_component(s.glossy_weight));
+  s.kind = FRESNEL_DIELECTRIC;
+  s.glossy_edge = vec3(1.0);
+  s.glossy_ior = COAT_IOR_LEAST + COAT_IOR_STEP * index;
+  s.glossy_tint = vec3(dielectric_f0(s.glossy_ior));
+  s.glossy_roughness = COAT_ROUGHNESS_STEP * (code - COAT_ROUGHNESSES * index);
+  s.glossy_anisotropy = 0.0;
+  s.distribution = DISTRIBUTION_MULTI_GGX;
+  s.coated = false;
   return s;
 }
 

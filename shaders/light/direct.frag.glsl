@@ -55,6 +55,16 @@ float meant_height(Light light, ivec2 pixel, float lift, vec3 normal, vec3 direc
   return (lifted && (light.flags & LIGHT_EVEN) == 0) ? lift : 0.0;
 }
 
+// What a lobe reflects of a point of a light that lies in `direction`. `samples`: how dense such points are beside rays of
+// the lobe that find the light, too; 0: none do. `inside`: only rays leave the object again.
+vec3 lobe_light(Lobe lobe, vec3 direction, float samples, bool inside)
+{
+  float density;
+  vec3 reflected = lobe_reflection(lobe, direction, density);
+  float ratio = density / max(samples, 1e-30);
+  return (samples > 0.0) ? (inside ? vec3(0.0) : reflected / (1.0 + ratio * ratio)) : reflected;
+}
+
 void main()
 {
   out_diffuse = vec4(0.0);
@@ -77,6 +87,12 @@ void main()
     lobe = lobe_begin(s, to_viewer);
     has_glossy = !lobe_is_mirror(lobe);
   }
+  Lobe coat;
+  bool has_coat = s.coated;
+  if (has_coat) {
+    coat = lobe_begin(surface_coat(s), to_viewer);
+    has_coat = !lobe_is_mirror(coat);
+  }
   bool traced = s.glossy_roughness <= traced_roughness;
   int group = receiver_group(pixel);
   vec3 diffuse = vec3(0.0);
@@ -97,7 +113,8 @@ void main()
     bool whole = LIGHTS_HAVE(LIGHT_AS_A_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
     bool on_diffuse = has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0;
     bool on_glossy = has_glossy && (light.flags & LIGHT_GLOSSY) != 0;
-    bool by_points = !whole || on_glossy;
+    bool on_coat = has_coat && (light.flags & LIGHT_GLOSSY) != 0;
+    bool by_points = !whole || on_glossy || on_coat;
 #ifdef SOFT_LOBES
     by_points = by_points || soft.exists;
 #endif
@@ -134,15 +151,15 @@ void main()
       towards = whole ? towards : direction;
       // None between a surface and the mirror's normal that was bent up from it (reflecting_normal).
       bool in_front = s.bump > 0.0 || dot(direction, s.normal) > 0.0 || surface_is_edited(s);
-      if (on_glossy && in_front && (s.lift > 0.0 || may_mirror(s, direction))) {
-        float lobe_density;
-        vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
-        if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
-          float rays = LIGHT_IS(light, LIGHT_SURFACE) ? 1.0 : float(CANDIDATES);
-          float ratio = rays * lobe_density / (light.rate * density);
-          reflected /= 1.0 + ratio * ratio;
+      if (in_front && (s.lift > 0.0 || may_mirror(s, direction))) {
+        float rays = LIGHT_IS(light, LIGHT_SURFACE) ? 1.0 : float(CANDIDATES);
+        float samples = (density > 0.0 && (light.flags & LIGHT_TRACED) != 0) ? light.rate * density / rays : 0.0;
+        if (on_glossy) {
+          from_glossy += lobe_light(lobe, direction, traced ? samples : 0.0, enters_itself(s, direction)) * arriving;
         }
-        from_glossy += reflected * arriving;
+        if (on_coat) {
+          from_glossy += lobe_light(coat, direction, samples, enters_itself(s, direction)) * arriving;
+        }
       }
 #ifdef SOFT_LOBES
       if (soft.exists) {

@@ -12,6 +12,10 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #ifdef ABSORBING
+vec3 solid_absorbs(int material)
+{
+  return interface_table_fetch(ivec2(2, material)).rgb;
+}
 #include "trace/solid.glsl"
 #endif
 #include "ask/media.glsl"
@@ -226,8 +230,7 @@ void main()
     bool leaves = dot(normal, direction) > 0.0;
     geometric_normal = leaves ? -normal : normal;
 #ifdef ABSORBING
-    int solid = (leaves && shape.y > 0.0) ? material : solid_around(origin, direction, ray_offset(origin), roll.y);
-    throughput *= (solid >= 0) ? exp(-interface_table_fetch(ivec2(2, solid)).rgb * t) : vec3(1.0);
+    throughput *= exp(-t * solid_absorption(origin, direction, t, hit, leaves, ray_offset(origin), roll.y));
 #endif
     if (to_unit(roll.x) >= shape.y) {
       Walk rest;
@@ -244,6 +247,7 @@ void main()
       rest.met.leaving = vec3(0.0);
       rest.met.straight = vec3(1.0);
       rest.met.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
+      rest.met.reflection.rough = 0.0;
       rest.met.reflection.through = 0.0;
       rest.met.reflection.straight = vec3(0.0);
       rest.met.reflection.grazing = vec3(0.0);

@@ -19,14 +19,14 @@ float lobe_share(float lobe_density, float light_density, float light_samples)
 }
 
 // Light that arrives along `direction` if nothing nearer than `limit` blocks it, with the shares applied. `span` is how
-// far the nearest and the farthest of its sources are.
-vec3 arriving(ivec2 pixel, vec3 origin, vec3 direction, float lobe_density, bool mirror, float limit, out vec2 span)
+// far the nearest and the farthest of its sources are. `alone`: light samples find none of it.
+vec3 arriving(ivec2 pixel, vec3 origin, vec3 direction, float lobe_density, bool alone, float limit, out vec2 span)
 {
   vec3 sum = vec3(0.0);
   span = vec2(1e29, 0.0);
   if (limit >= 1e29 && world_glossy != 0) {
     vec3 radiance = environment_radiance(direction);
-    if (world_samples > 0.0 && !mirror) {
+    if (world_samples > 0.0 && !alone) {
       radiance *= lobe_share(lobe_density, environment_density(direction), world_samples);
     }
     sum += radiance;
@@ -44,29 +44,29 @@ vec3 arriving(ivec2 pixel, vec3 origin, vec3 direction, float lobe_density, bool
     float density;
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && max_component(abs(radiance)) > 0.0) {
-      sum += radiance * (mirror ? 1.0 : lobe_share(lobe_density, density, light.rate));
+      sum += radiance * (alone ? 1.0 : lobe_share(lobe_density, density, light.rate));
       span = vec2(min(span.x, hit_distance), max(span.y, min(hit_distance, 1e29)));
     }
   }
   return sum;
 }
 
-void main()
+vec3 start_of_ray(Surface s, vec3 direction, uint layers)
 {
-  out_diffuse = vec4(0.0);
-  out_glossy = vec4(0.0);
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  if (surface_position_fetch(pixel).w == 0.0 || max_component(surface_tint_fetch(pixel).rgb) <= 0.0) {
-    return;
-  }
-  Surface s = surface_mirrored(SURFACE_READ(pixel));
+  vec3 origin = ray_origin(s.position, side_of_ray(s, direction));
+  return enters_itself(s, direction) ? beyond_solid(origin, direction, layers) : origin;
+}
+
+// Light that the lobe of a surface finds. `salt`: numbers of the pixel and lobe.
+vec3 light_of_lobe(Surface s, ivec2 pixel, uvec3 salt)
+{
   if (s.glossy_roughness > traced_roughness || s.kind > FRESNEL_F82) {
-    return;
+    return vec3(0.0);
   }
+  vec3 found = vec3(0.0);
   vec3 to_viewer = TO_VIEWER(s);
   Lobe lobe = lobe_begin(s, to_viewer);
   bool mirror = lobe_is_mirror(lobe);
-  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u));
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   float choice = shuffled(film_view.sample_index, salt.zx);  // apart from what chose the lobe
 
@@ -90,7 +90,8 @@ void main()
       lobe_reflection(lobe, direction, density);
     }
     vec2 span;
-    vec3 light = arriving(pixel, s.position, direction, density, mirror, 1e29, span);
+    bool alone = mirror || enters_itself(s, direction);
+    vec3 light = arriving(pixel, s.position, direction, density, alone, 1e29, span);
     float importance = dot(abs(weight * light), vec3(1.0));
     if (importance > 0.0 && reservoir_takes(importance, total, choice)) {
       kept_importance = importance;
@@ -100,14 +101,10 @@ void main()
       kept_span = span;
     }
   }
-  vec3 origin = ray_origin(s.position, s.geometric_normal);
   uint layers = salt.z + uint(film_view.sample_index);
   ivec2 hit;
   if (kept_importance > 0.0) {
-    origin = ray_origin(s.position, side_of_ray(s, kept_direction));
-    if (enters_itself(s, kept_direction)) {
-      origin = beyond_solid(origin, kept_direction, layers);
-    }
+    vec3 origin = start_of_ray(s, kept_direction, layers);
     // Whatever stands before the nearest source blocks all of them.
     // What is behind glass that bends is left to the rays of hits/, where these follow the lobe.
     bool glass_stops = glass_bends != 0 && s.glossy_roughness <= shaded_roughness;
@@ -115,10 +112,11 @@ void main()
     if (blocked >= kept_span.x) {
       vec2 ignored;
       float limit = (blocked < kept_span.y) ? blocked : 1e29;
-      vec3 light = arriving(pixel, s.position, kept_direction, kept_density, mirror, limit, ignored);
-      out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
+      bool alone = mirror || enters_itself(s, kept_direction);
+      vec3 light = arriving(pixel, s.position, kept_direction, kept_density, alone, limit, ignored);
+      found = kept_weight * light * (total / (kept_importance * float(count)));
       float reach = (kept_span.x < 1e28) ? kept_span.x : FARTHEST_MEDIUM;
-      out_glossy.rgb *= media_transmittance(origin, kept_direction, reach, salt.x);
+      found *= media_transmittance(origin, kept_direction, reach, salt.x);
     }
   }
   if (emissive_power > 0.0 && s.glossy_roughness > shaded_roughness) {
@@ -126,14 +124,15 @@ void main()
     vec3 weight;
     vec3 direction = lobe_sample(lobe, u, weight);
     if (max_component(weight) <= 0.0 || !may_mirror(s, direction)) {
-      return;
+      return found;
     }
+    vec3 origin = start_of_ray(s, direction, layers);
     float t = trace_nearest(origin, direction, 1e29, layers, hit);
     if (t < 1e29) {
       vec3 normal;
       vec3 emission = triangle_emission(hit, direction, normal);
       float share = 1.0;
-      if (!mirror && max_component(abs(emission)) > 0.0) {
+      if (!mirror && !enters_itself(s, direction) && max_component(abs(emission)) > 0.0) {
         float lobe_density;
         lobe_reflection(lobe, direction, lobe_density);
         // The density of points per area: addon/lighting/emissive_triangles.py.
@@ -143,7 +142,24 @@ void main()
         share = 1.0 / (1.0 + ratio * ratio);
       }
       weight *= media_transmittance(origin, direction, t, salt.y);
-      out_glossy.rgb += weight * emission * share;
+      found += weight * emission * share;
     }
+  }
+  return found;
+}
+
+void main()
+{
+  out_diffuse = vec4(0.0);
+  out_glossy = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  if (surface_position_fetch(pixel).w == 0.0 || max_component(surface_tint_fetch(pixel).rgb) <= 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(pixel);
+  // One call for both lobes: compilers hold the code of each.
+  for (int k = 0; k < (s.coated ? 2 : 1); k++) {
+    Surface shown = (k == 0) ? surface_mirrored(s) : surface_coat(s);
+    out_glossy.rgb += light_of_lobe(shown, pixel, hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u + uint(k))));
   }
 }

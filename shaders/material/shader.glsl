@@ -323,6 +323,10 @@ void shader_holdout(inout Closures closures, SurfacePoint point, vec3 weight)
 #ifndef BOTH_WAYS
 #define BOTH_WAYS false
 #endif
+// Whether a thin coat is kept beside the lobe below it: of what the camera sees, where rays follow both.
+#ifndef COAT_APART
+#define COAT_APART false
+#endif
 // How often glass at least mirrors that is asked for one way.
 #ifndef LEAST_MIRRORED
 #define LEAST_MIRRORED 0.25
@@ -477,10 +481,21 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
 {
   vec3 n = reflecting_normal(point, coat_normal);
   float ior = clamp(coat_ior, 1.0, MOST_IOR);
-  vec3 albedo = add_glossy(closures, point, weight * coat_weight, DISTRIBUTION_MULTI_GGX, FRESNEL_DIELECTRIC,
-                           vec3(dielectric_f0(ior)), vec3(1.0), ior, clamp(coat_roughness, 0.0, 1.0), 0.0,
-                           default_tangent(n), n);
   float mu = view_cosine(point, n);
+  vec3 whole = weight * coat_weight;
+  bool grey = largest(abs(whole - vec3(whole.x))) < 2e-3 * whole.x;
+  vec3 albedo;
+  if (COAT_APART && grey && closures.coat.x <= 0.0 && coat_is_thin(clamp(coat_roughness, 0.0, 1.0), ior)) {
+    float roughness = clamp(coat_roughness, 0.0, 1.0);
+    vec3 shown = glossy_albedo(FRESNEL_DIELECTRIC, vec3(dielectric_f0(ior)), vec3(1.0), ior, roughness, mu);
+    closures.coat = vec4(whole.x, roughness, ior, useful_luminance(closures, shown));
+    closures.coat_normal = n;
+    albedo = whole * shown;
+  }
+  else {
+    albedo = add_glossy(closures, point, whole, DISTRIBUTION_MULTI_GGX, FRESNEL_DIELECTRIC, vec3(dielectric_f0(ior)),
+                        vec3(1.0), ior, clamp(coat_roughness, 0.0, 1.0), 0.0, default_tangent(n), n);
+  }
   float cos_inside = sqrt(max(1.0 - (1.0 - mu * mu) / (ior * ior), 1e-6));
   vec3 absorption = pow(max(coat_tint, vec3(0.0)), vec3(1.0 / cos_inside));
   float covered = clamp(coat_weight, 0.0, 1.0);

@@ -6,58 +6,23 @@
 // AT_HITS: of rays that mirrors and glass send on, up to what those have met, instead of the camera's.
 #include "media/arriving.glsl"
 #ifdef AT_HITS
-#include "hits/path.glsl"
+#include "media/lobe_ray.glsl"
 #else
 #include "media/view_ray.glsl"
 #endif
 #include "media/dither.glsl"
 
-#ifdef AT_HITS
-struct ViewRay {
-  vec3 origin;
-  vec3 direction;
-  float limit;
-};
-
-// What media send back along a ray counts as light that the first surface mirrors or lets pass: what they emit, direct on
-// the first ray; all else indirect, as in Cycles.
-void show(ivec2 pixel, vec3 scattered, vec3 emitted)
-{
-  vec4 path = met_path_fetch(pixel);
-  vec3 direct = (ray_number == 0) ? path.rgb * emitted : vec3(0.0);
-  vec3 indirect = path.rgb * scattered + ((ray_number == 0) ? vec3(0.0) : path.rgb * emitted);
-  if (path_is_glossy(int(path.w + 0.5))) {
-    out_glossy_direct = vec4(direct, 0.0);
-    out_glossy_indirect = vec4(indirect, 0.0);
-  }
-#ifdef TRANSMISSION
-  else {
-    out_transmission_direct = vec4(direct, 0.0);
-    out_transmission_indirect = vec4(indirect, 0.0);
-  }
-#endif
-}
-#endif
-
 void main()
 {
 #ifdef AT_HITS
-  out_glossy_direct = vec4(0.0);
-  out_glossy_indirect = vec4(0.0);
-#ifdef TRANSMISSION
-  out_transmission_direct = vec4(0.0);
-  out_transmission_indirect = vec4(0.0);
-#endif
+  show_nothing();
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  if (met_path_fetch(pixel).w < 0.5) {
+  ViewRay ray;
+  int asks;
+  if (!lobe_ray(pixel, ray, asks)) {
     return;
   }
-  ViewRay ray;
-  ray.origin = lobe_start_fetch(pixel).xyz;
-  ray.direction = lobe_way_fetch(pixel).xyz;
-  vec4 met = surface_position_fetch(pixel);
-  ray.limit = (met.w != 0.0) ? max(dot(met.xyz - ray.origin, ray.direction), 0.0) : FARTHEST_MEDIUM;
-  media_asked_by(path_is_bent(int(met_path_fetch(pixel).w + 0.5)) ? MEDIA_OF_TRANSMISSION : MEDIA_OF_GLOSSY);
+  media_asked_by(asks);
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 181 + ray_number);
 #else
   out_direct = vec4(0.0);

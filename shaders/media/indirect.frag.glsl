@@ -8,11 +8,16 @@
 // for a place in media that the row lights: drawn along rays of the lamp (media/from_lamps.glsl) or by the phase function or
 // cosine and around the lamp, weighted by the balance heuristic. Then it goes on by phase function or cosine, to a place in
 // media drawn by what they let pass, or to a surface, where the row is asked. STRAIGHT_ALONE: `out_found` is what comes
-// straight from media that shine, and no lights are asked.
+// straight from media that shine, and no lights are asked. AT_HITS: view rays are those that mirrors and glass send on.
 #include "lib/gbuffer.glsl"
 #include "media/arriving.glsl"
 #include "media/from_lamps.glsl"
+#ifdef AT_HITS
+#include "media/lobe_ray.glsl"
+#else
 #include "media/view_ray.glsl"
+#endif
+#include "ask/leaving.glsl"
 #ifdef FROM_FROXELS
 #include "media/froxels.glsl"
 #endif
@@ -23,10 +28,17 @@
 #define SCATTERS_ON true
 #endif
 
-vec3 mean_albedo(ivec2 hit)
+#define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
+
+// `through`: how much of it leaves on the other side.
+vec3 mean_albedo(ivec2 hit, out float through)
 {
   int material = triangle_material(hit);
-  return reflectance_fetch(ivec2(material & 15, material >> 4)).rgb;
+  ivec2 place = ivec2(material & 15, material >> 4);
+  vec3 albedo = reflectance_fetch(place).rgb;
+  float passes = reflectance_fetch(place + ivec2(0, reflectance_size().y / REFLECTANCE_BANDS)).a;
+  through = clamp(passes / max(luminance(albedo), 1e-30), 0.0, 1.0);
+  return albedo;
 }
 
 // Light of row `number` on a surface of albedo 1, as radiance.
@@ -265,8 +277,21 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     else if (doing != LOOK && at_surface && (doing == GO_ON || abs(limit - wanted) < 1e-3 * wanted)) {
       vec3 normal = triangle_normal(hit);
       normal = (dot(normal, way) > 0.0) ? -normal : normal;
-      position = ray_origin(position + limit * way, normal);
-      vec3 bounced = passed * bins.end * mean_albedo(hit);
+      vec3 met = position + limit * way;
+      position = ray_origin(met, normal);
+      float through;
+      vec3 bounced = passed * bins.end * mean_albedo(hit, through);
+      // Light from below the surface takes the place of what a diffuse one would send.
+      vec3 sent;
+      vec3 part;
+      vec3 same;
+      bool leaves = light_leaves(triangle_material(hit), position, normal, -way, seed, sent, part, same);
+      vec3 straight_on = leaves ? bounced * (vec3(1.0) - part) : bounced;
+      // Of leaves, paper, cloth one of both sides is looked at, at random.
+      if (through > 0.0 && media_random(seed) < through) {
+        normal = -normal;
+        position = ray_origin(met, normal);
+      }
       // As GO_ON draws from this stop, whichever of the two has come here.
       float by_lamp = (SCATTERS_ON && rays.exist && bounce + 1 < bounces) ? AIMED : 0.0;
       float going = lobe * (1.0 - chance) * (1.0 - by_lamp);
@@ -281,12 +306,16 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
           asked.reach = sqrt(squared);
           asked.shadow = asked.shadow && doing == GO_ON;  // the lamp's own ray has come here
           from_lamp = lamp_rays_share(rays, arriving) * abs(dot(normal, arriving)) / squared;
-          from_lamp *= limit * limit / max(-dot(normal, way), 1e-6);
+          from_lamp *= limit * limit / max(abs(dot(normal, way)), 1e-6);
         }
-        arrives = bounced / max(going + from_lamp, 1e-30);  // balance heuristic
+        arrives = straight_on / max(going + from_lamp, 1e-30);  // balance heuristic
       }
       if (doing == GO_ON) {
         weight = bounced / going;
+        if (leaves) {
+          sum += after_media ? weight * part * sent : vec3(0.0);
+          weight *= vec3(1.0) - part * (vec3(1.0) - same);
+        }
         stop.inside = 0u;
         stop.normal = normal;
         stop.face = normal;
@@ -338,9 +367,9 @@ Start start_at(vec3 position, vec3 onwards)
 }
 
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
-Start on_ray(ViewRay ray, int number, vec2 ask_turn, float v, inout uint seed)
+Start on_ray(ViewRay ray, int asks, int number, vec2 ask_turn, float v, inout uint seed)
 {
-  media_asked_by(MEDIA_OF_CAMERA);
+  media_asked_by(asks);
   media_bins(ray.origin, ray.direction, ray.limit, seed);
   Start start = start_at(ray.origin, -ray.direction);
   if (!(bins.total > 0.0) || bins.count == 0) {
@@ -372,11 +401,17 @@ Start on_ray(ViewRay ray, int number, vec2 ask_turn, float v, inout uint seed)
 
 void main()
 {
+#ifdef AT_HITS
+  show_nothing();
+#else
   out_found = vec4(0.0);
 #if defined(SHINING) && !defined(STRAIGHT_ALONE)
   out_straight = vec4(0.0);
 #endif
+#endif
   ivec2 size = surface_position_size();
+  int asks = MEDIA_OF_CAMERA;
+  int ray_salt = 0;
 #ifdef FROM_FROXELS
   ivec3 cell = froxel_of(ivec2(gl_FragCoord.xy));
   uint seed = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 48).x;
@@ -398,6 +433,14 @@ void main()
   start.stop.by_unit = true;
   start.weight = vec3(1.0);
   out_found.w = 1.0;
+#elif defined(AT_HITS)
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ViewRay ray;
+  if (!lobe_ray(pixel, ray, asks)) {
+    return;
+  }
+  ray_salt = 1 + ray_number;
+  uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 211 + ray_number).x;
 #else
   ivec2 pixel = min(ivec2(gl_FragCoord.xy) * stride + shown_pixel, size - 1);
   ViewRay ray = view_ray(surface_position_fetch(pixel), vec2(pixel) + 0.5);
@@ -417,7 +460,7 @@ void main()
   }
 #endif
 #endif
-  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) + 4711u));
+  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed + 8192 * ray_salt) + 4711u));
   vec3 sum = vec3(0.0);
   vec3 straight_sum = vec3(0.0);
   for (int which = 0; which < walks; which++) {
@@ -431,7 +474,7 @@ void main()
 #endif
     vec2 ask_turn = vec2(media_random(seed), media_random(seed));
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
-    Start start = on_ray(ray, number, ask_turn, shuffled(turn, salt.yz), seed);
+    Start start = on_ray(ray, asks, number, ask_turn, shuffled(turn, salt.yz), seed);
 #endif
     if (max_component(start.weight) > 0.0) {
       vec3 straight;
@@ -444,11 +487,15 @@ void main()
       straight_sum += finite_sum(straight);
     }
   }
+#ifdef AT_HITS
+  show(pixel, (sum + straight_sum) / float(walks), vec3(0.0));
+#else
 #ifdef STRAIGHT_ALONE
   sum = straight_sum;
 #endif
   out_found.rgb = sum / float(walks);
 #if defined(SHINING) && !defined(STRAIGHT_ALONE)
   out_straight = vec4(straight_sum / float(walks), out_found.w);
+#endif
 #endif
 }

@@ -193,7 +193,7 @@ void micro_fill(MicroFrame f, ivec2 corner)
           float chord = sqrt(2.0 * sine / (1.0 + sqrt(1.0 - sine)));
           vec3 direction = to_node * inversesqrt(squared);
 #ifdef GLOSSY
-          reach = 0.5 * STRETCH * chord * side / max(2.0 * f.angle, 1e-6);
+          reach = STRETCH * chord * side / max(2.0 * f.angle, 1e-6);  // its pixels lie beside each other on the cone
           float apart = acos(clamp(dot(direction, f.axis), -1.0, 1.0));
           high = (apart > f.angle + asin(sqrt(sine))) ? ivec2(-1) : high;
 #else

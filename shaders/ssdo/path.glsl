@@ -21,14 +21,15 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
     sum += throughput * direct_reflected(met, -direction, 1, roll.x);
     float choice = to_unit(roll.z);
     roll = hash3(roll);
-    vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= even_share(met) * PI * reflection_of(met.reflection, met.lit, onward, -direction);
+    vec3 reflected;
+    vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));
+    direction = reflection_sample(met.reflection, met.lit, -direction, u, reflected);
+    throughput *= even_share(met) * reflected;
     float stay = min(max_component(throughput), 1.0);
     if (choice >= stay) {
       break;
     }
     throughput /= stay;
-    direction = onward;
     origin = ray_origin(lit_position(met), met.lit);
   }
   return sum;

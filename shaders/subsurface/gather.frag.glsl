@@ -7,6 +7,7 @@
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "subsurface/image.glsl"
+#include "subsurface/lines.glsl"
 #include "subsurface/profile.glsl"
 #include "subsurface/walked.glsl"
 
@@ -71,7 +72,10 @@ Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, flo
     vec3 weights = profile_radial(profile, away) * weight;
     arriving_pixel(sum, pixel, translucency, weights);
     if (walked > 0.0) {
-      float side = side_of_walk(octahedral_decode(surface_normal_fetch(pixel).zw), normal);
+      // A pixel shows the more of a surface the more this is turned away.
+      vec3 face = octahedral_decode(surface_normal_fetch(pixel).zw);
+      vec3 view = view_toward(position);
+      float side = side_of_walk(face, normal, view) / max(dot(face, view), 0.05);
       arriving_pixel(alike, pixel, translucency, weights * side);
     }
   }
@@ -87,6 +91,7 @@ struct Far {
   Arriving beside;
   Arriving behind;
   float chord;  // mean length of lines through the object from here, m
+  vec3 lines;   // how much of Burley's profile Cycles counts in the window, over a plane's
 };
 
 // Of points that face the other way, how much more a walk finds them than a plane's profile says, at `paths` mean free paths:
@@ -131,6 +136,8 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
   orthonormal_basis(normal, tangent, bitangent);
   float chords = 0.0;
   float chord_weight = 0.0;
+  vec3 lines = vec3(0.0);
+  float lines_weight = 0.0;
   int first = int(object.x + 0.5);
   int last = first + int(object.y + 0.5);
   for (int row = first; row < last; row++) {
@@ -148,8 +155,14 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
         float facing = dot(face, normal);
         float front = smoothstep(-0.2, 0.4, facing);
         float nearness = front / (r * r + object.z * object.z);
-        chords += nearness * shape.z;
-        chord_weight += nearness;
+        if (shape.z < 0.0) {
+          lines += nearness * unpack_lines(shape.z);
+          lines_weight += nearness;
+        }
+        else {
+          chords += nearness * shape.z;
+          chord_weight += nearness;
+        }
         // Within `core` 1/r is taken for its mean over the disc around the nearest point of the face's plane.
         float core = 0.25 * object.z;
         float height = abs(dot(cell.xyz - position, face));
@@ -171,6 +184,7 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
     }
   }
   far.chord = (chord_weight > 0.0) ? chords / chord_weight : 1e30;
+  far.lines = (lines_weight > 0.0) ? lines / lines_weight : vec3(1.0);
   return far;
 }
 
@@ -251,6 +265,7 @@ void main()
         // Cycles sums the profile over the surface as it is, thin or bent: the mean of that over the samples so far.
         out_whole += vec4(far.ahead.whole, 1.0);
         scale = min(out_whole.xyz / out_whole.w, vec3(4.0));
+        inside *= far.lines;
         all = vec3(1.0);
       }
       direct = (inside * direct + scale * (far.ahead.direct + spare * direct) / whole + far.behind.direct) / all;

@@ -1,14 +1,13 @@
 // What light below the surface leaves objects at their points, for whoever sees them but the camera (lighting/leaving_light.py): by
-// walks from each point, entered from directions of the cosine's density. For albedo 1:
+// walks from each point, entered from directions of the cosine's density. For albedo 1, added over the samples of a picture:
 //
-//   sent  radiance, of the direct light of points, mean over directions
+//   sent  radiance, of the direct light of points, mean over directions; w: walks
 //   slope by how much more the normal's direction gets than the surface's: the line fitted to the walks by the cosine
-//   lean  along the surface, the direction towards which more leaves, by how much of the mean: a vector for each channel
-//   part  share of the diffuse albedo that scatters and that walks find; the rest is as a diffuse surface
-//   same  of light that arrives evenly at the side on which the point lies, how much leaves there again
+//   same  of light that arrives evenly at the side on which the point lies, how much leaves there again; w: samples
+//   red, green, blue  lean along the surface, by how much more the direction towards it gets, of each channel; w: part, the share
+//         of the diffuse albedo that scatters and that walks find; the rest is as a diffuse surface
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
-#include "subsurface/lean.glsl"
 #include "subsurface/walks.glsl"
 #include "subsurface/walked.glsl"
 
@@ -38,10 +37,11 @@ void main()
 {
   ivec2 texel = ivec2(gl_FragCoord.xy);
   out_sent = vec4(0.0);
-  out_part = vec4(0.0);
   out_same = vec4(0.0);
   out_slope = vec4(0.0);
-  out_lean = vec4(vec3(pack_lean(vec3(0.0))), 0.0);
+  out_red = vec4(0.0);
+  out_green = vec4(0.0);
+  out_blue = vec4(0.0);
   vec4 place = point_position_fetch(texel);
   vec4 belongs = point_instances_fetch(texel);
   int material = int(belongs.w + 0.5);
@@ -92,13 +92,12 @@ void main()
   }
   rest *= walk_rest(color.rgb);
   vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / (max(color.rgb, vec3(1e-3)) * float(walks));
-  out_sent = vec4(sent_so_far * norm, 0.0);
-  // One over the variance of the cosine; its noise is larger than what it adds: a mean over the samples so far.
-  vec3 slope = 18.0 * by_cosine * norm;
-  out_slope = vec4((newest < 1.0) ? mix(slope_before_fetch(texel).rgb, slope, newest) : slope, 0.0);
-  // One over the variance of either component along the surface.
-  vec3 per = vec3(4.0) / max(sent_so_far, vec3(1e-12));
-  out_lean = vec4(pack_lean(per.x * aslant[0]), pack_lean(per.y * aslant[1]), pack_lean(per.z * aslant[2]), 0.0);
-  out_part = vec4(part * share.rgb, 0.0);
-  out_same = vec4(same_so_far * norm, 0.0);
+  out_sent = vec4(sent_so_far * norm, float(walks));
+  // One over the variance of the cosine, and of either component along the surface.
+  out_slope = vec4(18.0 * by_cosine * norm, 0.0);
+  vec3 found = part * share.rgb;
+  out_red = vec4(4.0 * norm.r * aslant[0], found.r);
+  out_green = vec4(4.0 * norm.g * aslant[1], found.g);
+  out_blue = vec4(4.0 * norm.b * aslant[2], found.b);
+  out_same = vec4(same_so_far * norm, 1.0);
 }

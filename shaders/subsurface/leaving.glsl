@@ -63,8 +63,7 @@ bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint
   part = parts.xyz;
   vec3 lean = leaving_texel(first + 4).xyz;
   vec3 aslant = vec3(dot(unpack_lean(lean.x), to_viewer), dot(unpack_lean(lean.y), to_viewer), dot(unpack_lean(lean.z), to_viewer));
-  aslant = max(vec3(1.0) + aslant, vec3(0.0));
-  sent = max(mean.xyz * aslant + slope.xyz * (dot(normal, to_viewer) - MEAN_COSINE_SENT), vec3(0.0));
+  sent = mean.xyz * max(vec3(1.0) + aslant + slope.xyz * (dot(normal, to_viewer) - MEAN_COSINE_SENT), vec3(0.0));
   same = vec3(mean.w, parts.w, slope.w);
   return max_component(part) > 0.0;
 }

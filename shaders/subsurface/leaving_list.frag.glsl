@@ -1,30 +1,36 @@
-// Writes what leaves points into the list that subsurface/leaving.glsl reads, five texels for each: the mean, w: red of what leaves
-// on the same side; the part, w: green of that; the slope, w: blue of that; the place; the lean of each channel.
+// Writes what leaves points into the list that subsurface/leaving.glsl reads, of sums over the samples so far, five texels for each:
+// the mean, w: red of what leaves on the same side; the part, w: green of that; the slope as a share of the mean, w: blue of
+// that; the place; how each channel leans, as a share of the mean.
 #include "lib/gbuffer.glsl"
 #include "subsurface/image.glsl"
 #include "subsurface/lean.glsl"
 
-#define BESIDE 4  // points on either side along the curve on which they stand
+#define BESIDE 4        // points on either side along the curve on which they stand, whose leans are alike
+#define AS_DIFFUSE 8.0  // walks that count as of a diffuse surface: few tell little of directions
 
-// Mean slope of points around that face alike, and of how they lean.
+// How what leaves depends on the direction, as a share of the mean: sums over points that face alike by sums, since a single walk that
+// finds light says nothing of those that find none. The slope is that of a row of points; the lean changes within it.
 vec3 slope_at(ivec2 texel, out mat3 lean)
 {
   vec3 normal = octahedral_decode(point_normal_fetch(texel).xy);
-  vec3 sum = vec3(0.0);
-  float count = 0.0;
+  vec3 slope = vec3(0.0);
+  vec4 sloping = vec4(0.0);
+  vec4 leaning = vec4(0.0);
   lean = mat3(0.0);
-  for (int k = -BESIDE; k <= BESIDE; k++) {
-    ivec2 other = ivec2(texel.x + k, texel.y);
-    if (other.x >= 0 && other.x < ROW) {
-      float alike = smoothstep(0.5, 0.9, dot(octahedral_decode(point_normal_fetch(other).xy), normal));
-      sum += alike * cell_slope_fetch(other).rgb;
-      vec3 leans = cell_lean_fetch(other).xyz;
-      lean += alike * mat3(unpack_lean(leans.x), unpack_lean(leans.y), unpack_lean(leans.z));
-      count += alike;
+  for (int x = 0; x < ROW; x++) {
+    ivec2 other = ivec2(x, texel.y);
+    float alike = smoothstep(0.5, 0.9, dot(octahedral_decode(point_normal_fetch(other).xy), normal));
+    vec4 sent = alike * cell_sent_fetch(other);
+    sloping += sent;
+    slope += alike * cell_slope_fetch(other).rgb;
+    if (abs(x - texel.x) <= BESIDE) {
+      leaning += sent;
+      lean += alike * mat3(cell_red_fetch(other).rgb, cell_green_fetch(other).rgb, cell_blue_fetch(other).rgb);
     }
   }
-  lean /= max(count, 1e-6);
-  return sum / max(count, 1e-6);
+  vec3 per = vec3(leaning.w / (leaning.w + AS_DIFFUSE)) / max(leaning.rgb, vec3(1e-20));
+  lean = mat3(per.r * lean[0], per.g * lean[1], per.b * lean[2]);
+  return slope * (sloping.w / (sloping.w + AS_DIFFUSE)) / max(sloping.rgb, vec3(1e-20));
 }
 
 void main()
@@ -38,10 +44,13 @@ void main()
     return;
   }
   int kind = index - 5 * cell;
-  vec3 same = cell_same_fetch(texel).rgb;
+  vec4 same = cell_same_fetch(texel);
+  float per = 1.0 / max(same.w, 1.0);
+  same *= per;
+  vec3 part = per * vec3(cell_red_fetch(texel).w, cell_green_fetch(texel).w, cell_blue_fetch(texel).w);
   mat3 lean = mat3(0.0);
   vec3 slope = (kind == 2 || kind == 4) ? slope_at(texel, lean) : vec3(0.0);
-  out_texel = (kind == 0) ? vec4(cell_sent_fetch(texel).rgb, same.r) : (kind == 1) ? vec4(cell_part_fetch(texel).rgb, same.g)
+  out_texel = (kind == 0) ? vec4(per * cell_sent_fetch(texel).rgb, same.r) : (kind == 1) ? vec4(part, same.g)
             : (kind == 2) ? vec4(slope, same.b) : (kind == 3) ? vec4(point_position_fetch(texel).xyz, 0.0)
             : vec4(pack_lean(lean[0]), pack_lean(lean[1]), pack_lean(lean[2]), 0.0);
 }

@@ -38,6 +38,18 @@ vec3 walk_returned(vec3 absorption, float cosine)
   return max(vec3(1.0) - absorption * h, vec3(0.0)) * correction;
 }
 
+Profile burley_profile(vec3 d)
+{
+  Profile p;
+  p.share1 = vec3(0.25);
+  p.share2 = vec3(0.75);
+  p.share3 = vec3(0.0);
+  p.scale1 = d;
+  p.scale2 = 3.0 * d;
+  p.scale3 = d;
+  return p;
+}
+
 #ifdef WALK_LOBES
 void walk_channel(float absorption, out vec3 share, out vec3 scale)
 {
@@ -54,13 +66,7 @@ void walk_channel(float absorption, out vec3 share, out vec3 scale)
 // `length_m`: Burley's d, or the walk's mean free path, per channel.
 Profile profile_of(int kind, vec3 length_m, vec3 albedo)
 {
-  Profile p;
-  p.share1 = vec3(0.25);
-  p.share2 = vec3(0.75);
-  p.share3 = vec3(0.0);
-  p.scale1 = length_m;
-  p.scale2 = 3.0 * length_m;
-  p.scale3 = length_m;
+  Profile p = burley_profile(length_m);
   if (kind == PROFILE_WALK) {
     vec3 absorption = walk_absorption(albedo);
     vec3 share;

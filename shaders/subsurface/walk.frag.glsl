@@ -31,7 +31,7 @@ vec4 voxels;
 void walk_leaves(vec3 weight, vec3 place, vec3 facing, vec2 u)
 {
   ivec2 shown_at;
-  float same = side_of_walk(facing, entered_normal) * (pixel_seen(place, shown_at) ? 1.0 : 0.0);
+  float same = side_of_walk(facing, entered_normal, view_toward(place)) * (pixel_seen(place, shown_at) ? 1.0 : 0.0);
   float near = near_window(distance(place, entered_at), pixels_range) * same;
   walked_so_far.near += weight * near;
   weight *= 1.0 - near;
@@ -90,8 +90,9 @@ void main()
   points_spacing = object.z;
   translucent = spread_entry_fetch(pixel).w;
   vec3 rest = vec3(0.0);
-  for (int walk = 0; walk < walks; walk++) {
-    Even even = even_of(pixel, film_view.sample_index * walks + walk, 227);
+  int count = walks_of_pixel(walks, most_walks, width, below.free_path);
+  for (int walk = 0; walk < count; walk++) {
+    Even even = even_of(pixel, film_view.sample_index * count + walk, 227);
     vec3 direction = entry_direction(normal, view, entry.x, entry.y, method == SCATTER_SKIN, even_entry(even));
     if (dot(direction, face) >= 0.0) {
       continue;
@@ -101,7 +102,7 @@ void main()
   // What is left leaves where others have left.
   Walked sum = walked_so_far;
   rest *= walk_rest(color);
-  vec3 norm = (vec3(1.0) + rest / max(sum.near + sum.far, vec3(1e-6))) / (max(color, vec3(1e-3)) * float(walks));
+  vec3 norm = (vec3(1.0) + rest / max(sum.near + sum.far, vec3(1e-6))) / (max(color, vec3(1e-3)) * float(count));
   out_direct = vec4(sum.direct * norm, part);
   out_indirect = vec4(sum.indirect * norm, part);
   out_near = vec4(sum.near * norm, part);

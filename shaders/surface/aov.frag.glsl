@@ -29,6 +29,12 @@ void main()
   if (fragment_hidden(point.position, 1.0)) {
     discard;
   }
+#ifdef WIDENS_STRANDS
+  // Strands that are drawn wider than they are give something where the surface images have kept them.
+  if (strand_is_thin() && !fragment_hidden(point.position, -1.0)) {
+    discard;
+  }
+#endif
   point.refracts = true;
 #ifdef LAYERED
   Closures c = closures_begin(point.normal, 0.5, 0.0);

@@ -20,7 +20,7 @@ void main()
   }
   Closures c;
   vec3 color;
-  bool colored = layer_color(point, c, color);
+  bool colored = layer_color(point, instance, c, color);
   out_position = vec4(point.position, 1.0);
   out_tint = vec4(colored ? color : vec3(1.0), 1.0);
   out_emission = vec4((instance.flags & FLAG_HOLDOUT) != 0 ? vec3(0.0) : c.emission, 0.0);

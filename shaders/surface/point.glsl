@@ -37,6 +37,15 @@ vec2 smooth_lift(Instance instance, bool back)
   return back ? lift.yx : lift;
 }
 
+#ifdef WIDENS_STRANDS
+// Whether the strand is drawn wider than it is here: minus its share of the width is 0 of what is no strand, -1 where all
+// is kept (surface.vert.glsl).
+bool strand_is_thin()
+{
+  return normal_heights.z < 0.0 && normal_heights.z > -0.9999;
+}
+#endif
+
 // The point that a mesh fragment shades. Both normals are turned to the viewer's side, as Cycles does.
 
 SurfacePoint surface_point(vec3 incoming, Instance instance)

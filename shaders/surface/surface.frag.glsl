@@ -5,7 +5,9 @@
 #include "lib/random.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/instance.glsl"
-#define BOTH_WAYS (glass_bends == 2)
+// `glass_bends`: 1 and 2 as of draw_surfaces; 4 beside either keeps thin coats beside the lobe below them.
+#define BOTH_WAYS ((glass_bends & 3) == 2)
+#define COAT_APART ((glass_bends & 4) != 0)
 #include "generated/material"
 #include "surface/point.glsl"
 #include "surface/store.glsl"
@@ -35,10 +37,20 @@ void main()
   if (depth < film_view.film.z || depth > film_view.film.w) {
     discard;
   }
-  point.refracts = glass_bends != 0;
+  point.refracts = (glass_bends & 3) != 0;
 
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
+#ifdef WIDENS_STRANDS
+  // Of a strand that is drawn wider than it is, the near side alone, and of that its share.
+  bool strand_kept = true;
+  for (bool thin = strand_is_thin(); thin; thin = false) {
+    strand_kept = !point.backfacing && shuffled(film_view.sample_index, layer.xy) < -normal_heights.z;
+  }
+  if (!strand_kept) {
+    discard;
+  }
+#endif
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
 #ifdef ONE_LOBE
   Closures c = closures_begin(point.normal, lobe_choice, 0.0);
@@ -51,9 +63,11 @@ void main()
   own_closures(c, point, own);
 #endif
 
-  float through = layer_chance(c);
-  // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie); from 3
-  // on: stochastic, but opaque from so many thousandths of opacity on, as passes of data have it.
+  bool cuts = (instance.flags & FLAG_HOLDOUT) != 0;
+  float through = layer_chance(c, (transparent_mode < 0 || transparent_mode > 2) && !cuts);
+  // transparent_mode 0: stochastic; -1: that, before surface/tint.frag.glsl colours what passes; 1: draw as
+  // opaque; 2: leave out (the two ends between which all layers lie); from 3 on: as -1, but opaque from so many thousandths
+  // of opacity on, as passes of data have it.
   bool passes = (transparent_mode != 2) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
   if (transparent_mode > 2 && 1.0 - dot(c.transparency, vec3(1.0 / 3.0)) >= float(transparent_mode - 3) * 1e-3 - 1e-5) {
     passes = false;
@@ -61,10 +75,10 @@ void main()
   if (transparent_mode != 1 && passes) {
     discard;
   }
-  float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
+  float covered = (transparent_mode <= 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
   float holdout = clamp(c.holdout * covered, 0.0, 1.0);
   // It cuts its hole in what the camera sees; other views ask for what the object reflects, which lights others.
-  if ((instance.flags & FLAG_HOLDOUT) != 0 && film_view.visibility == FLAG_CAMERA) {
+  if (cuts && film_view.visibility == FLAG_CAMERA) {
     holdout = 1.0;
     covered = 0.0;
   }

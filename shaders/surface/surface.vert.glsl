@@ -2,6 +2,7 @@
 #include "lib/instance.glsl"
 #include "lib/projection.glsl"
 #include "generated/attributes"
+#include "generated/strands"
 
 void main()
 {
@@ -16,10 +17,24 @@ void main()
   // Of lengths along normals, a transform by cofactors makes those in world space times its determinant.
   normal_heights.x = dot(world_position - instance_origin(instance), world_normal);
   normal_heights.yz = (instance_volume(instance) * unit) * envelope;
+  vec3 drawn = world_position;
+#ifdef STRANDS
+  for (bool is_strand = envelope.y < 0.0; is_strand; is_strand = false) {
+    normal_heights.yz = vec2(0.0);
+#ifdef WIDENS_STRANDS
+    // -1 where all is kept, so that between vertices that are kept whole and others the share runs on.
+    for (bool widens = film_view.visibility == FLAG_CAMERA; widens; widens = false) {
+      float share;
+      drawn = strand_vertex(instance, world_position, normal, share);
+      normal_heights.z = -share;
+    }
+#endif
+  }
+#endif
   instance_flat = ivec2(id, (instance.mirrored != projection_mirrors(PROJECTION)) ? 1 : 0);
 #ifdef MATERIAL_BASE
   instance_flat.y += 2 * (first_value + (local_instance >> 21));
 #endif
   copy_attributes();
-  gl_Position = instance_seen(instance) ? project(world_position, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);
+  gl_Position = instance_seen(instance) ? project(drawn, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);
 }

@@ -1,5 +1,5 @@
 // Colour of a transparent layer over what lies behind it, to be multiplied into the surface images: the surface pass has
-// already let the sample pass with the probability of the mean, so what is left is colour over mean. The order of layers
+// already let the sample pass with the chance of the layer, so what is left is colour over chance. The order of layers
 // does not matter. What was hit itself, or lies behind it, changes nothing.
 #include "lib/math.glsl"
 #include "lib/closure.glsl"
@@ -20,7 +20,7 @@ void main()
   }
   Closures c;
   vec3 color;
-  if (!layer_color(point, c, color)) {
+  if (!layer_color(point, instance, c, color)) {
     discard;
   }
   out_diffuse = vec4(color, 1.0);

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.flicker import HEAD, figures, rows_of, write_film
-from bench.markdown import END, begin, table
+from bench.flicker import bias_of, figures, write_film
 
 
 def test_errors_that_stand_still_are_no_flicker():
@@ -26,10 +25,9 @@ def test_grain_of_single_pixels_is_a_fifth_after_the_blur():
     assert boiling / grain == pytest.approx(0.2, rel=0.05)
 
 
-def test_rows_of_a_page_are_those_of_one_command():
-    rows = [["hall", *"123456"], ["box", *"123456"]]
-    page = f"a\n{begin('python -m bench flicker')}\n\nMade.\n\n{table([HEAD, *rows])}\n\n{END}\n| b |\n"
-    assert rows_of(page, "python -m bench flicker", HEAD) == rows
+def test_bias_has_a_standard_error_where_there_are_several_seeds():
+    assert bias_of([1.02]) == "1.020"
+    assert bias_of([0.98, 1.0, 1.02]) == "1.000 ± 0.012"  # .02 / sqrt(3)
 
 
 def test_a_film_goes_forth_and_back(tmp_path):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench import mutations
+from bench import drawn_mutations, mutations
 from bench.mutations import BROKEN, EQUIVALENT, KILLED, STALE, SURVIVED, Mutation
 
 SOURCE = "def double(x):\n    return 2 * x\n"
@@ -76,8 +76,8 @@ def test_the_working_tree_is_copied_without_what_git_ignores(tmp_path):
 
 
 def test_drawn_wrongs_are_the_same_for_a_seed_and_change_code_alone():
-    found = mutations.drawn(40, 3, None)
-    assert found == mutations.drawn(40, 3, None) and len({one.name for one in found}) == 40
+    found = mutations.drawn(40, 3, {})
+    assert found == mutations.drawn(40, 3, {}) and len({one.name for one in found}) == 40
     for one in found:
         text = (mutations.ROOT / one.file).read_text("utf-8")
         wrong = one.applied(text)
@@ -86,3 +86,58 @@ def test_drawn_wrongs_are_the_same_for_a_seed_and_change_code_alone():
             compile(wrong, one.file, "exec")
         else:
             assert "//" not in text[text.rfind("\n", 0, one.at) + 1 : one.at], "a comment"
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "is_choice"),
+    [
+        ("  vec4 attributes[8];\n", "8", True),
+        ("  vec4 attributes = row[8];\n", "8", False),
+        ("POINTS = 2\n", "2", True),
+        ("FACTOR = 1.3\n", "1.3", False),
+        ('Param("r", "R", 0.6, "")', "0.6", True),
+        ('(Socket("C", "COLOR", (1.0, 0.9)),)', "0.9", True),
+        ("max(1.0, 0.9)", "0.9", False),
+        ("    levels: int = 6\n", "6", True),
+        ('frame.count(self, "passes", 1 + more)', "1", True),
+        ("#define SAME 1e-4\nif (a <= SAME * t) {", "*", True),
+        ("#define SIZE 2.0\na = SIZE * t;", "*", False),
+        ("x = 2e-5 * reach", "*", True),
+        ("x = a < 0.5", "0.5", True),
+        ("x = a + 0.5", "0.5", False),
+    ],
+)
+def test_what_is_a_choice_is_not_drawn(text, old, is_choice):
+    assert drawn_mutations._is_a_choice(text, text.rindex(old), old) == is_choice
+
+
+def test_a_draw_stays_what_it_is_where_files_are_added(monkeypatch, tmp_path):
+    """Those that were drawn are found by their line, wherever it stands now; others take the places of lines that are
+    gone, and none is drawn twice."""
+    source = tmp_path / "addon" / "film" / "one.py"
+    source.parent.mkdir(parents=True)
+    source.write_text("def f(x, y):\n    return x + y + 2.5 * x\n")
+    for module in (mutations, drawn_mutations):
+        monkeypatch.setattr(module, "ROOT", tmp_path)
+    monkeypatch.setattr(drawn_mutations, "tests_for", lambda file: ("tests",))
+    for kept in (drawn_mutations.places_of, drawn_mutations._texts):
+        kept.cache_clear()
+    first = mutations.drawn(2, 1, {})
+    kept = {one.name: {"state": KILLED, "by": "", **mutations._place_in_line(one)} for one in first}
+    source.write_text("# Moved.\n\n" + source.read_text())
+    (source.parent / "another.py").write_text("a = b - c\n")
+    drawn_mutations.places_of.cache_clear()
+    again = mutations.drawn(3, 1, kept)
+    assert [(one.name, one.old) for one in again[:2]] == [(one.name, one.old) for one in first]
+    assert [one.at for one in again[:2]] == [one.at + len("# Moved.\n\n") for one in first]
+    assert again[2].name not in kept and (again[2].file, again[2].at) not in {(one.file, one.at) for one in again[:2]}
+    source.write_text("def f(x, y):\n    return x\n")
+    drawn_mutations.places_of.cache_clear()
+    assert not {one.name for one in mutations.drawn(1, 1, kept)} & {*kept}
+    drawn_mutations.places_of.cache_clear()
+
+
+@pytest.mark.parametrize(("text", "at"), [("a = (v & 1) << 3;", 12), ("a = (v & 1) << 3;", 13), ("max(b, 1e-6)", 9)])
+def test_signs_of_shifts_and_exponents_are_no_places(text, at):
+    assert drawn_mutations._is_part_of_a_word(text, at)
+    assert not drawn_mutations._is_part_of_a_word("a = b < c - d;", 6)

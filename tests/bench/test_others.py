@@ -4,6 +4,7 @@ import argparse
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bench import others
@@ -53,3 +54,14 @@ def test_the_page_counts_and_names_every_file():
 def test_every_repository_is_named_by_a_whole_commit():
     for one in others.repositories():
         assert len(one["commit"]) == 40 and int(one["commit"], 16) and one["about"]
+
+
+def test_a_light_path_that_is_off_is_named_though_the_pictures_error_is_small():
+    def images(combined, glossy):
+        return {"combined": np.full((4, 6, 4), combined), "glossy_direct": np.full((4, 6, 3), glossy)}
+
+    first, second = images(1.0, 0.10), images(1.0, 0.10)
+    assert others.paths_that_differ(images(1.0, 0.15), first, second) == ["glossy_direct +5.0%"]
+    assert others.paths_that_differ(images(1.0, 0.11), first, second) == []  # a hundredth of the light
+    noisy = images(1.0, 0.14)  # the references differ by 4 %: nothing within 8 % more can be told
+    assert others.paths_that_differ(images(1.0, 0.19), first, noisy) == []

@@ -55,6 +55,12 @@ def test_pictures_that_cannot_be_compared_are_red(truth, wrong):
     assert "failed" in found and pairs.colour(found) == pairs.RED
 
 
+def test_two_black_pictures_are_alike(truth):
+    black = np.zeros_like(truth)
+    assert pairs.judged(black, black, black, 16)["good"]
+    assert not pairs.judged(truth, black, black, 16)["good"]
+
+
 def test_a_short_reference_allows_nothing(truth):
     """Its own noise is in the error already: what is within bounds all the same needs no longer one."""
     half = np.kron(np.random.default_rng(3).normal(0.0, 0.1, (6, 8, 1)), np.ones((4, 4, 3)))

@@ -1,5 +1,6 @@
 """Scenes made at random: the same number makes the same scene, and what differs is said."""
 
+import argparse
 from types import SimpleNamespace
 
 import numpy as np
@@ -69,5 +70,9 @@ def test_scenes_by_candela_alone_are_counted_and_what_is_wrong_is_said(monkeypat
 
     monkeypatch.setattr(reference, "render_passes", lambda *given, **options: None)
     monkeypatch.setattr(ledger, "latest", lambda: SimpleNamespace(bad_pixels=bad))
-    assert random_scenes.alone(0, 0.2, (16, 12), 4, every=1) == int(bad > 0)
-    assert said in capsys.readouterr().out
+    parser = argparse.ArgumentParser()
+    random_scenes.add_options(parser)
+    options = parser.parse_args(["--alone", "0.2", "--size", "16x12", "--every", "1", "--same"])
+    assert random_scenes.alone(options) == int(bad > 0)
+    printed = capsys.readouterr().out
+    assert said in printed and "1 scenes, " in printed and "MiB of images" in printed

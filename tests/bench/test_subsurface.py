@@ -1,6 +1,9 @@
-"""The table of processor seconds for equal error below surfaces."""
+"""Figures of light below surfaces: processor seconds for equal error, bias and noise."""
 
-from bench import subsurface
+import numpy as np
+import pytest
+
+from bench import subsurface, subsurface_split
 
 
 def row(label, error, seconds):
@@ -16,3 +19,17 @@ def test_denoised_cycles_is_asked_for_the_least_that_errs_no_more():
     one, sixteen = subsurface.equal(rows)
     assert one[2:] == ("1", "0.0150", "0.10", "16 samples, 0.0070", "0.11")
     assert sixteen[2:] == ("16", "0.0010", "0.90", "none of these", "–")
+
+
+def test_noise_and_bias_are_told_apart_whatever_the_noise_of_the_references():
+    random = np.random.default_rng(1)
+    right = np.full((64, 64, 3), 2.0)
+    pictures = np.stack([right * 1.1 + random.normal(0.0, 0.5, right.shape) for _ in range(8)])
+    references = np.stack([right + random.normal(0.0, 0.3, right.shape) for _ in range(4)])
+    noise, bias = subsurface_split.parts_of_error(pictures, references)
+    scale = 2.0**2 + 0.2**2
+    assert abs(noise * scale / 0.5**2 - 1.0) < 0.05
+    assert abs(bias * scale / 0.2**2 - 1.0) < 0.1
+    ratio, of_pictures, of_references = subsurface_split.means_of(pictures, references)
+    assert [float(one) for one in ratio.split()] == pytest.approx([1.1] * 3, abs=0.01)
+    assert float(of_pictures.split()[0]) < 1.0 and float(of_references.split()[0]) < 1.0

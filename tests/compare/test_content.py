@@ -6,6 +6,7 @@ import bpy
 import pytest
 
 from addon.compare.content import Dna, blend_hash, read_blocks
+from bench import reflection_scenes
 
 
 def written(scene, path):
@@ -91,6 +92,15 @@ def test_own_settings_are_left_out_and_others_are_not(registered, room, tmp_path
     assert blend_hash(written(room, tmp_path / "b.blend")) == before
     room["zebra"] = 2
     assert blend_hash(written(room, tmp_path / "c.blend")) != before
+
+
+def test_a_scene_built_anew_has_the_same_hash(registered, tmp_path):
+    def built(name):
+        reflection_scenes.make("glass ball")
+        bpy.context.view_layer.update()
+        return blend_hash(written(bpy.context.scene, tmp_path / name))
+
+    assert built("a.blend") == built("b.blend")
 
 
 def test_what_is_no_blend_file_is_refused():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.eye import crystalline, lids, optics, pupil, spectrum, vitreous
-from addon.eye.aperture import WINDOW, Aperture, Eye, aperture_at, older
+from addon.eye.aperture import WINDOW, Aperture, Eye, _cornea, aperture_at, older
 from addon.eye.noise import at_integers, value_noise
 from addon.eye.presets import PRESETS
 
@@ -222,6 +222,47 @@ def test_the_colour_matching_functions_are_balanced():
     np.testing.assert_allclose((rows[:, :3] / rows[:, 3:] ** 2).sum(axis=0) / len(rows), 1.0, atol=1e-5)
 
 
+def planck(kelvin, nanometres):
+    """Spectral radiance but for a factor, from the constants of the SI."""
+    metres = np.asarray(nanometres, np.float64) * 1e-9
+    return metres**-5 / np.expm1(6.62607015e-34 * 299792458.0 / (metres * 1.380649e-23 * kelvin))
+
+
+EVERY_NM = np.arange(380.5, 770.0)
+
+
+@pytest.mark.parametrize("kelvin", [1900.0, 2800.0, 5800.0, 12000.0])
+def test_the_spectrum_of_a_blackbodys_colour_is_plancks(kelvin):
+    power = planck(kelvin, EVERY_NM)
+    colour = tuple(spectrum.TO_REC709 @ (power @ spectrum.xyz(EVERY_NM)))
+    np.testing.assert_allclose(spectrum.of_light("BLACKBODY", kelvin, EVERY_NM) * power.sum(),
+                               power * spectrum.of_light("BLACKBODY", kelvin, EVERY_NM).sum(), rtol=1e-4)  # fmt: skip
+    if min(colour) < 0.0:
+        colour = tuple(max(channel, 0.0) for channel in colour)  # candles are redder than the picture's red and green
+    found = spectrum.of_light("COLOUR", colour, EVERY_NM)
+    seen = spectrum.xyz(EVERY_NM)[:, 1]
+    ratio = found / (found @ seen) / (power / (power @ seen))
+    assert np.abs(ratio - 1.0)[(EVERY_NM > 430) & (EVERY_NM < 670)].max() < 0.1
+
+
+def test_an_upsampled_spectrum_has_the_colour_it_is_of():
+    random = np.random.default_rng(5)
+    for colour in (*random.random((40, 3)), *np.eye(3), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0.1, 0.1)):
+        power = spectrum.of_light("COLOUR", tuple(map(float, colour)), EVERY_NM)
+        seen = power @ spectrum.xyz(EVERY_NM)
+        wanted = np.linalg.solve(spectrum.TO_REC709, np.asarray(colour, float))
+        assert (power >= 0.0).all() and power.max() <= 1.0
+        # Reds and purples at the rim of the picture's colours have none so smooth: the nearest.
+        near = 1e-3 if min(colour) > 0.05 * max(colour) else 0.02
+        np.testing.assert_allclose(seen[:2] / seen.sum(), wanted[:2] / wanted.sum(), atol=near, err_msg=str(colour))
+
+
+def test_a_picture_of_no_light_is_white_and_noise_makes_no_other_colour():
+    assert spectrum.rounded((0.0, 0.0, 0.0)) == spectrum.rounded((np.nan, 0.0, -1.0)) == (1.0, 1.0, 1.0)
+    assert spectrum.rounded((40.0, 20.0, 0.0)) == (1.0, 0.5, 2.0**-5)
+    assert spectrum.rounded((4.0, 2.0, 1.0)) == spectrum.rounded((4.1, 2.0, 1.02))
+
+
 def radial_mean(image):
     side = len(image)
     y, x = np.mgrid[0:side, 0:side] - side // 2
@@ -276,3 +317,12 @@ def test_the_kernel_does_not_depend_on_how_fine_the_pattern_is():
         shares.append(kernel[within].sum() / 3)
     assert shares[1] == pytest.approx(shares[2], abs=0.02)
     assert shares[0] == pytest.approx(shares[1], abs=0.08)
+
+
+def test_particles_of_the_cornea_are_uniform_over_the_widest_pupil():
+    """Of a uniform disc all moments cos(k angle) vanish, the mean squared distance is half of the radius squared."""
+    x, y = _cornea(20_000, 3)
+    radius = pupil.LARGEST / 2
+    turn = np.exp(1j * np.arctan2(y, x)[:, None] * np.arange(1, 7))
+    assert np.abs(turn.mean(axis=0)).max() < 4.0 / np.sqrt(20_000)
+    assert (x**2 + y**2).mean() == pytest.approx(radius**2 / 2, rel=0.02)

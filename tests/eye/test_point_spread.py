@@ -223,6 +223,33 @@ def test_carried_light_is_a_fresnel_zone_plate_ago():
     assert np.abs(found[255:257, 255:257]).mean() == pytest.approx(2 * abs(np.sin(zones / 2)), abs=0.1)
 
 
+@pytest.mark.parametrize("kelvin", [2400.0, 2800.0, 6500.0])
+def test_a_blackbody_disperses_a_ring_as_plancks_law_says(point_spread, kelvin):
+    """The light of a wavelength lies at its share of 575 nm of the ring's radius, and the sum over wavelengths is shown
+    where it is positive: each channel's mean radius and light."""
+    side, ring = 512, 60.0
+    y, x = np.mgrid[0:side, 0:side] - side // 2
+    radius = np.hypot(x, y)
+    pattern = images.upload(np.exp(-0.5 * ((radius - ring) / 1.5) ** 2), "R32F")
+    target = images.Target((images.create(side, side, "RGBA32F"),))
+    point_spread.colour(pattern, target, least=256, light=("BLACKBODY", kelvin))
+    found = images.read(target.colors[0])[..., :3].astype(np.float64)
+    metres = spectrum.wavelength((np.arange(2000) + 0.5) / 2000) * 1e-9
+    power = metres**-5 / np.expm1(6.62607015e-34 * 299792458.0 / (metres * 1.380649e-23 * kelvin))
+    seen = power[:, None] * (spectrum.xyz(1e9 * metres) @ spectrum.TO_REC709.T)
+    scale, at = 575e-9 / metres, np.arange(0.05, 120.0, 0.1)
+    profile = np.exp(-0.5 * ((at[:, None] * scale - ring) / 1.5) ** 2) @ (seen * scale[:, None] ** 2)
+    shown = profile.clip(0.0) * at[:, None]  # what lies outside of the picture's colours is cut
+    light, whole = found.sum(axis=(0, 1)), np.exp(-0.5 * ((at - ring) / 1.5) ** 2) @ at * seen.sum(axis=0)
+    np.testing.assert_allclose(
+        (found * radius[..., None]).sum(axis=(0, 1)) / light,
+        (shown * at[:, None]).sum(axis=0) / shown.sum(axis=0),
+        rtol=2e-3,
+    )
+    ring_light = np.exp(-0.5 * ((radius - ring) / 1.5) ** 2).sum()
+    np.testing.assert_allclose(light / ring_light, shown.sum(axis=0) / whole, rtol=5e-3)
+
+
 def test_a_lamps_spectrum_disperses_as_it_has_wavelengths():
     """Channels keep their sum; a blackbody is brightest where Wien says, and sodium is one line."""
     for light in ("LED", "FLUORESCENT", "SODIUM", "BLACKBODY"):

@@ -434,6 +434,8 @@ def test_the_job_type_of_flamenco_asks_what_its_job_was_asked():
         'const OF_RENDERING = ["--skip-existing", "--samples=8", "--size=64x48", "--scene=-Shot \\"2\\"", '
         '"--set=use_denoise=0"];'
     ) in text
+    named = farm.flamenco("const OF_RENDERING = [];", options)  # a file may be called so
+    assert 'label: "Candela: const OF_RENDERING = [];"' in named and named.count('"--size=64x48"') == 1
 
 
 @pytest.mark.parametrize(("split", "tasks"), [(1, 3), (2, 9)])

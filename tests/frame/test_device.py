@@ -132,7 +132,7 @@ def test_film_points_differ_between_two_devices_and_ledger_and_plan_say_why(room
 def test_figures_are_measured_once_and_kept_for_this_driver(unknown):
     first = device_probe.ensure()
     assert device.known()
-    (kept,) = json.loads((unknown / "devices.json").read_text(encoding="utf-8")).items()
+    (kept,) = json.loads((unknown / device.FILE).read_text(encoding="utf-8")).items()
     assert kept == (device.key(), asdict(first))
     device.use(None)
     device.measured_s = -1.0
@@ -142,14 +142,14 @@ def test_figures_are_measured_once_and_kept_for_this_driver(unknown):
 
 @pytest.mark.parametrize("content", ["", "[]", "{", '{"KEY": {"texel": 1}}', '{"KEY": null}', '{"another": {}}'])
 def test_figures_that_cannot_be_read_are_measured(unknown, content):
-    (unknown / "devices.json").write_text(content.replace("KEY", device.key()), encoding="utf-8")
+    (unknown / device.FILE).write_text(content.replace("KEY", device.key()), encoding="utf-8")
     assert device.read(unknown) is None
 
 
 def test_a_made_up_device_is_taken_as_it_is(unknown, monkeypatch, tmp_path):
     monkeypatch.setenv(device.VARIABLE, "card")
     assert device_probe.ensure() == device.MADE_UP["card"]
-    assert not (unknown / "devices.json").exists()
+    assert not (unknown / device.FILE).exists()
     device.use(None)
     path = tmp_path / "own.json"
     path.write_text(json.dumps(asdict(TRACER)), encoding="utf-8")
@@ -172,5 +172,8 @@ def test_the_preferences_tell_the_figures(unknown):
 @pytest.mark.timing
 def test_measuring_takes_a_fifth_of_a_second_once_its_programs_are_compiled(unknown):
     device_probe.measure()
-    device_probe.measure()
-    assert device.measured_s < 0.2
+    seconds = []  # of the clock: what else the machine does can only add
+    for _ in range(5):
+        device_probe.measure()
+        seconds.append(device.measured_s)
+    assert min(seconds) < 0.2, seconds

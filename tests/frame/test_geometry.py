@@ -1,6 +1,7 @@
 """The list of instances on the GPU: what a move uploads, and that it says the same as a list that is uploaded anew."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 
 from addon.gfx import geometry as gfx_geometry
 from addon.gfx import images
+from addon.materials.compiled import Attribute
 from addon.scene import geometry
+from addon.scene.corners import corner_attribute
 from addon.scene.geometry import MOST_MOVED, SceneGeometry
 from addon.scene.materials import MaterialSet
 from addon.snapshot import SnapshotCache, take
@@ -129,3 +132,25 @@ def test_no_batch_has_the_number_of_another(gpu_context):
     vertices = gfx_geometry.vertex_buffer(position=np.eye(3, dtype=np.float32))
     numbers = [gfx_geometry.triangle_batch(vertices, np.array([[0, 1, 2]])).number for _ in range(8)]
     assert len(set(numbers)) == 8
+
+
+def test_what_is_named_may_be_colours_or_a_map():
+    """Colours read as a map have its three numbers, a map read as colours is opaque; what is not there is 0."""
+    corners = np.arange(3)
+    paint, around = np.arange(12.0).reshape(3, 4), np.arange(6.0).reshape(3, 2) + 20
+    mesh = SimpleNamespace(
+        corner_vertices=corners, uv_maps={"Around": around}, colors={"Paint": paint}, active_uv="Around",
+        active_color="Paint", motion=None,
+    )  # fmt: skip
+    zero, one = np.zeros((3, 1)), np.ones((3, 1))
+    for kind, name, expected in (
+        ("UV", "Paint", [paint[:, :3], zero]),
+        ("UV", "", [around, zero, zero]),
+        ("COLOR", "", [paint]),
+        ("COLOR", "Around", [around, zero, one]),
+        ("UV_PASS", "", [around, one, zero]),
+        ("NAMED", "None", [zero, zero, zero, one]),
+        ("UV", "None", [zero] * 4),
+    ):
+        found = corner_attribute(mesh, Attribute(kind, name))
+        np.testing.assert_array_equal(found, np.concatenate(expected, axis=1), err_msg=f"{kind} {name}")

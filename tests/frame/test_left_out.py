@@ -1,5 +1,6 @@
 """What pictures lack by design is said: for the scene's size, and where systems meet."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -58,7 +59,7 @@ def test_scenes_that_can_be_traced_say_nothing(monkeypatch):
 def test_what_mirrors_lack_of_volumes_and_grass_is_said(monkeypatch, bounces, count):
     for name in ("too_many", "too_many_copies"):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
-    settings = SimpleNamespace(bounces=4, get=lambda technique, name: bounces)
+    settings = SimpleNamespace(bounces=bounces, get=lambda technique, name: bounces)
     names = "airlight", "shaded_reflections", "grass", "volume_caustics"
     air, mirrors, grass, beams = (SimpleNamespace(name=name) for name in names)
     assert len(left_out.notes_of(Plan((air, mirrors), (), {}), SCENE, settings, ())) == count
@@ -135,6 +136,11 @@ def test_gloss_that_is_thrown_wider_than_it_is_is_named(monkeypatch, inputs, sai
     plan, some = Plan((), (), {"indirect": "instant_radiosity", "caustics": "caustics"}), SimpleNamespace(bounces=4)
     notes = left_out.notes_of(plan, scene, some, [material])
     assert bool(notes) == said and all("'Pan'" in note.text and note.subject == "Gloss" for note in notes)
+    assert all("as by a roughness of 0.5" in note.text for note in notes)
+    evenly = left_out.notes_of(
+        replace(plan, filled=plan.filled | {"indirect": "micro_rendering"}), scene, some, [material]
+    )
+    assert bool(evenly) == said and all("as by dull surfaces" in note.text for note in evenly)
     assert (
         left_out.notes_of(plan, scene, FEW, [material])
         == left_out.notes_of(Plan((), (), {}), scene, some, [material])

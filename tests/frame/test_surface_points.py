@@ -1,9 +1,12 @@
 """The stand-in for a scene: what its points and triangles cover, where they lie, and what they are never made of."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.scene.surface_points import COVER, RUNS, Surfaces, spread
+from addon.scene.surfels import _reach
 
 POINTS = 64
 EYE = np.zeros(3)
@@ -93,3 +96,18 @@ def test_normals_and_numbers_tell_which_side_is_seen():
     np.testing.assert_allclose(up[:, 1, :2], 0.0, atol=1e-6)  # octahedral: the middle is up, the corners are down
     np.testing.assert_allclose(np.abs(mirrored[:, 1, :2]), 1.0, atol=1e-6)
     assert (both[:, 1, 2] == 0.25).all()
+
+
+def test_of_large_scenes_area_counts_less_far_from_the_eye():
+    """From one and a half times the distance of what is seen on, as a power of two, from a place on a grid of such
+    steps; in a scene of eight times that or less, nowhere."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = (103.0, -7.0, 1.0)
+    frame = SimpleNamespace(
+        geometry=SimpleNamespace(size=100.0, origin=np.array([3.0, 0.0, 0.0])),
+        snapshot=SimpleNamespace(camera=SimpleNamespace(matrix=matrix)),
+    )
+    reach, eye = _reach(frame, 5.0)
+    assert reach == 8.0 and eye.tolist() == [96.0, -8.0, 0.0]
+    frame.geometry.size = 64.0
+    assert _reach(frame, 5.0)[0] == np.inf

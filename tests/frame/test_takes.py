@@ -40,6 +40,13 @@ def test_a_group_that_shines_at_one_moment_alone_has_a_take_with_all_moments():
     assert lit == [[["key"], ["key"]], [[], ["fill"]]]
 
 
+def test_the_first_group_tells_all_that_is_no_light():
+    whole = scene("key", "fill")
+    whole = replace(whole, film=replace(whole.film, indices=True, cryptomattes=("object",)))
+    first, second = (take.snapshot.film for take in takes_of(whole))
+    assert first is whole.film and second == replace(whole.film, indices=False, cryptomattes=())
+
+
 def test_a_plain_picture_is_one_take():
     whole = scene("key", groups=())
     (take,) = takes_of(whole)

@@ -1,4 +1,5 @@
-"""Samples that a technique takes part in (sampling/turns.py), and how often it does (frame/shares.py)."""
+"""Samples that a technique takes part in (sampling/turns.py, sampling/interleaved.py), and how often it does
+(frame/shares.py)."""
 
 from itertools import pairwise
 
@@ -6,8 +7,10 @@ import numpy as np
 import pytest
 
 from addon.frame import shares
+from addon.sampling.interleaved import FEWEST, interleaving
 from addon.sampling.sequence import bits
-from addon.sampling.turns import FEWEST, most_apart, turns
+from addon.sampling.turns import FEWEST as FEWEST_TURNS
+from addon.sampling.turns import most_apart, turns
 
 
 @pytest.mark.parametrize("samples", [8, 9, 16, 50, 64, 100])
@@ -39,7 +42,7 @@ def test_the_smaller_a_share_the_fewer_samples():
     assert shares.apart_by(shares.WHOLE, 64) == 1 and shares.apart_by(np.inf, 64) == 1
     assert shares.apart_by(shares.WHOLE / 4, 64) == 2
     assert shares.apart_by(shares.WHOLE / 17, 64) == 4
-    assert shares.apart_by(2e-5, 16) == most_apart(16) == 4 and most_apart(7, FEWEST) == 1
+    assert shares.apart_by(2e-5, 16) == most_apart(16) == 4 and most_apart(7, FEWEST_TURNS) == 1
     assert shares.apart_by(0.0, 16) == 8
 
 
@@ -48,3 +51,30 @@ def test_share_of_a_gloss_that_is_a_tenth_of_the_light():
     assert shares.share_of((0.1 * light) ** 2, light) == pytest.approx(0.01 / 1.01)
     assert shares.share_of(np.zeros(12), np.zeros(12)) == 0.0
     assert shares.share_of(np.ones(12), np.zeros(12)) == np.inf
+
+
+@pytest.mark.parametrize("samples", [16, 32, 64, 128])
+@pytest.mark.parametrize("groups", [2, 3, 4, 7, 20])
+def test_pixels_share_out_samples_evenly(samples, groups):
+    """Each has as many in both halves, one in each block, and first numbers from all parts of the first dimension."""
+    part = interleaving(groups, samples)
+    assert part.count <= 2 * groups and samples // part.count >= FEWEST
+    drawn: dict[tuple[int, int], list[int]] = {}
+    for sample in range(samples):
+        drawn.setdefault(part.place(sample), []).append(sample)
+    assert sorted(drawn) == sorted((x, y) for x in range(part.columns) for y in range(part.rows))
+    for taken in drawn.values():
+        assert [part.visit(sample) for sample in taken] == list(range(samples // part.count))
+        assert sum(sample < samples // 2 for sample in taken) == len(taken) / 2
+        first = bits(np.array(taken, np.uint64), 0) >> np.uint64(30)
+        assert np.ptp(np.bincount(first.astype(int), minlength=4)) == 0
+
+
+def test_groups_begin_at_different_pixels():
+    places = {interleaving(4, 16, first).place(5) for first in range(4)}
+    assert len(places) == 4
+
+
+@pytest.mark.parametrize(("groups", "samples"), [(1, 64), (4, 1), (4, 7), (2, 6), (2, 9)])
+def test_few_samples_and_single_pictures_draw_every_pixel(groups, samples):
+    assert interleaving(groups, samples) is None

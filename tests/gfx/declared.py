@@ -86,8 +86,14 @@ def programs() -> list[Program]:
     made += [answered(lighting(HARD, False), (LINKS,))]
     made += [answered(next(one for one in made if LEAVES.asked in asked_by(one)), (LEAVES,))]
     made += relief_programs()
+    hair = replace(plain, strands=True, program_key=f"s{plain.program_key}")
+    made += [materials._surface_program(hair), materials._scatter_program(hair), materials._caster_program(hair)]
     layouts = ((("UV", "VECTOR"),), (("", "COLOR"), ("", "VALUE")))
-    made += [lamp_program(plain), *(materials._aov_program(plain, (held,)) for held in layouts)]
+    made += [
+        lamp_program(plain),
+        materials._aov_program(hair, layouts[:1]),
+        *(materials._aov_program(plain, (held,)) for held in layouts),
+    ]
     for length, file in enumerate(files, len(plain.values)):  # blocks of several lengths among the structs
         values = np.zeros((length, 4), np.float32)
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)

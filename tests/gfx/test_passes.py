@@ -1,5 +1,7 @@
 """Full-screen passes, draws and dispatches: blending, viewports, thread counts, shared memory."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -240,3 +242,7 @@ def test_an_image_beside_others_is_said_to_be_left_out_where_a_program_has_no_ro
     assert passes.left_out == {("crowded", "lamp_maps")}
     assert images.read(target.colors[0])[0, 0, 0] == len(names)
     passes.left_out.clear()
+    passes.fullscreen(
+        replace(crowded, has_no_use=("lamp_maps",)), target, textures=dict.fromkeys(names, beside)
+    )  # what has no use for it says nothing
+    assert not passes.left_out

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from addon.grass import compression
+from addon.grass import patch as patches
+from addon.grass.directions import Rings
 
 
 def pictures(places=300, count=21, seed=0):
@@ -72,3 +74,18 @@ def test_a_plane_of_one_colour_needs_no_component():
     light = np.broadcast_to((0.3 * lights)[None, :, None], (50, 3, 3)).copy()
     found = compression.compressed(light, 1, 1, white=1.0)
     assert np.abs(found - light).max() < 1e-9
+
+
+def test_contrast_gives_pictures_the_deviation_back_that_they_lost():
+    """As pixels see them: decoded pictures, with their means set right, times the contrast deviate as the true ones."""
+    rng, lights = np.random.default_rng(5), Rings((0.0, 50.0), (1, 6))
+    texels, brightness = 16, rng.random((16, 16, 3)) ** 3
+    waves = [rng.random((texels, texels, 1)) ** 4 for _ in range(lights.number)]
+    true = np.stack([brightness * (0.05 + 3.0 * one) for one in waves])
+    made = patches.compressed_patch(
+        0.4, 0.1, Rings((0.0,), (1,)), lights, lambda view: true, np.zeros((1, texels, texels)), luma=1, chroma=1
+    )
+    seen = [patches._seen(one @ compression.LUMA).std(axis=(1, 2)) for one in (true, made.pictures(0)[:-1])]
+    contrast = made.contrast[0, :-1]
+    assert np.abs(made.ratio[0, :-1] - 1).max() > 0.1 and (contrast > 0.5).all() and (contrast < 3.0).all()
+    np.testing.assert_allclose(seen[1] * contrast, seen[0], rtol=1e-4)

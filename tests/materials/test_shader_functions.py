@@ -5,27 +5,11 @@ import colorsys
 import numpy as np
 import pytest
 
-from addon.gfx import images, passes
+from addon.gfx import images
 from addon.materials.energy import energy_texture
 from addon.materials.sky import XYZ_TO_RGB
 from addon.materials.thin_film import _matching
-
-
-def evaluated(include: str, expression: str, count: int = 64, bound=None, **given) -> np.ndarray:
-    """(count, 4) a GLSL expression of `k`, 0 to 1 over the pixels, with functions of a shader file."""
-    source = f'''#include "{include}"
-void main()
-{{
-  float k = (gl_FragCoord.x - 0.5) / {count - 1}.0;
-  out_value = {expression};
-}}'''
-    program = passes.fullscreen_program(
-        f"probe of {include}", "generated/main", outputs=(("VEC4", "out_value"),),
-        snippets=(("generated/main", source),), **given,
-    )  # fmt: skip
-    with images.borrowed(count, 1, "RGBA32F") as target:
-        passes.fullscreen(program, target, textures=bound or {})
-        return images.read(target.colors[0])[0].astype(np.float64)
+from tests.glsl import evaluated
 
 
 def test_the_edge_of_the_sun_is_darker_by_the_law_of_its_limb(gpu_context):
@@ -119,3 +103,31 @@ def test_colours_go_to_models_of_hue_and_back(gpu_context, model):
         expected = [np.array(colorsys.rgb_to_hls(*one))[[0, 2, 1]] for one in rgb]
     np.testing.assert_allclose(there[:, :3], expected, atol=1e-4)
     np.testing.assert_allclose(back[:, :3], rgb, atol=1e-5)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_the_scale_of_gabor_noise_multiplies_places(gpu_context, dimensions):
+    """Noise of scale 3 is that of scale 1 at three times the place, bit for bit where both are exact."""
+
+    def noise(place, scale):
+        given = f"{place}, {scale}, 2.0, 0.7, 0.5, vec3(0.6, 0.0, 0.8), a, b, c"
+        return evaluated(
+            "material/gabor.glsl", "vec4(a, b, c, 0.0)",
+            before=f"float at = floor(63.0 * k + 0.5) / 32.0; float a; float b; float c;"
+                   f"texture_gabor_{dimensions}d({given});",
+        )  # fmt: skip
+
+    small = noise("vec3(at, 0.25 + at, 0.5 - at)", 3.0)
+    assert small[:, 0].std() > 0.02
+    np.testing.assert_array_equal(small, noise("3.0 * vec3(at, 0.25 + at, 0.5 - at)", 1.0))
+
+
+def test_displacement_is_what_lies_above_the_middle_times_the_scale(gpu_context):
+    """(value - midlevel) scale, of heights along the normal, of vectors as they are."""
+    for call, expected in (
+        ("vector_displacement_world(vec3(k, 2.0 * k, -k), 0.25, 3.0, d)", [[3, -0.75], [6, -0.75], [-3, -0.75]]),
+        ("displacement_along_normal(k, 0.25, 3.0, vec3(0.6, 0.0, 0.8), d)", [[1.8, -0.45], [0, 0], [2.4, -0.6]]),
+    ):
+        found = evaluated("lib/surface_point.glsl material/bump.glsl", "vec4(d, k)", before=f"vec3 d; {call};")
+        slope, start = np.array(expected).T
+        np.testing.assert_allclose(found[:, :3], slope * found[:, 3:] + start, atol=1e-6)

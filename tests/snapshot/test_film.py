@@ -57,9 +57,8 @@ def test_a_border_of_the_caller_wins(stage):
 def test_a_border_without_width_keeps_a_pixel(stage):
     render = stage.scene.render
     render.use_border = True
-    render.border_min_x = render.border_max_x = 1.0
-    x0, _, x1, _ = stage.take(width=64, height=48).film.border
-    assert (x0, x1) == (63, 64)
+    render.border_min_x = render.border_max_x = render.border_min_y = render.border_max_y = 1.0
+    assert stage.take(width=64, height=48).film.border == (63, 47, 64, 48)
 
 
 def test_the_snapshot_names_its_scene_and_says_what_it_cost(stage):

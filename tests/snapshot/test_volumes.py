@@ -1,11 +1,14 @@
 """Volume objects arrive as grids of voxels, with what their objects and modifiers make of them."""
 
+import time
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 
 from addon.snapshot import SnapshotCache, instances, smoke
-from addon.snapshot.volumes import openvdb
+from addon.snapshot.volumes import _grids, openvdb
 from tests.snapshot.test_instances import collection_of, in_layer
 
 
@@ -158,3 +161,56 @@ def test_a_domain_of_smoke_counts_as_a_volume_of_the_view_layer(stage, monkeypat
     snapshot = stage.take()
     assert snapshot.volumes == ()
     assert len(snapshot.instances) == surfaces
+
+
+def test_two_voxels_far_apart_take_no_memory(stage, cloud, tmp_path):
+    vdb = openvdb()
+    grid = vdb.FloatGrid()
+    grid.name = "density"
+    for place in ((0, 0, 0), (100_000, 100_000, 100_000)):
+        grid.fill(place, place, 1.0)
+    vdb.write(str(tmp_path / "cloud.vdb"), [grid])
+    snapshot = stage.take(SnapshotCache())
+    assert not snapshot.volumes
+    assert any("box of 100001 x 100001 x 100001" in note.text and "resample" in note.text for note in snapshot.notes)
+
+
+def test_a_large_grid_read_in_layers_has_the_means_of_its_voxels(stage, cloud, tmp_path):
+    """400 voxels along x, ten in each of the others: three become one."""
+    values = np.random.default_rng(3).random((400, 10, 10)).astype(np.float32)
+    vdb = openvdb()
+    grid = vdb.FloatGrid()
+    grid.name = "density"
+    grid.copyFromArray(values)
+    vdb.write(str(tmp_path / "cloud.vdb"), [grid])
+    found = only_volume(stage.take(SnapshotCache())).grids["density"]
+    padded = np.pad(values, ((0, 2), (0, 2), (0, 2))).reshape(134, 3, 4, 3, 4, 3)
+    np.testing.assert_allclose(found, padded.mean(axis=(1, 3, 5)), atol=1e-6)
+
+
+def test_a_text_longer_than_its_file_is_refused_before_memory_is_taken_for_it(cloud, tmp_path):
+    """Blender has read the file's headers by then and waited for it; Candela does not wait again."""
+    path = tmp_path / "cloud.vdb"
+    whole, text = path.read_bytes(), b"\x04\x00\x00\x00name\x06\x00\x00\x00string"
+    assert whole.count(text) == 1 and _grids(str(path)) is not None
+    at = whole.index(text) + len(text)
+    path.write_bytes(whole[:at] + b"\xf0\xff\xff\x7f" + whole[at + 4 :])
+    started = time.process_time()
+    with pytest.raises(ValueError, match="beyond its end"):
+        _grids(str(path))
+    assert time.process_time() - started < 0.5
+
+
+@pytest.mark.parametrize("finer", [1, 2])
+def test_smoke_with_noise_has_cells_that_many_times_finer(finer):
+    """Grids of a domain of 2 x 3 x 4 cells, x running fastest; noise makes them finer along each axis."""
+    size = np.array((2, 3, 4)) * finer
+    count = int(size.prod())
+    settings = SimpleNamespace(
+        density_grid=np.arange(1.0, count + 1.0), flame_grid=[], temperature_grid=[], heat_grid=[], color_grid=[],
+        domain_resolution=(2, 3, 4), use_noise=finer > 1, noise_scale=finer,
+    )  # fmt: skip
+    ((name, density),) = smoke.domain_grids(settings).items()
+    assert name == "density" and density.shape == tuple(size)
+    x, y, z = np.indices(size)
+    np.testing.assert_array_equal(density, 1.0 + x + size[0] * (y + size[1] * z))

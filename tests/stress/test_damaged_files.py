@@ -13,10 +13,15 @@ from functools import partial
 import numpy as np
 import pytest
 
+from addon.cli.refused import Refused
+from addon.cli.slices import read_header, read_sums
 from addon.compare.exr_write import read_about, write_exr
 from addon.gfx import device
 from addon.materials import ies
+from addon.snapshot import vdb_header
 from addon.snapshot.exr import ExrError, read_exr
+from addon.snapshot.scene import one_line
+from addon.snapshot.volumes import openvdb
 
 COUNT = int(os.environ.get("CANDELA_FUZZ", "100"))
 MOST_BYTES, MOST_SECONDS = 200 << 20, 2.0  # for one file of some kilobytes
@@ -28,6 +33,12 @@ TILT=NONE
 0 90 180 270
 1 2 3 4 5 1 2 3 4 5 1 2 3 4 5 1 2 3 4 5
 """
+
+HEADER = {
+    "file": "/elsewhere/scene.blend", "scene_hash": "abc123", "settings_hash": "", "blender": "", "frame": 1,
+    "total": 2, "first": 0, "count": 1, "layers": ["A"],
+    "options": {"size": None, "scene": "S", "view_layer": None, "assignments": []},
+}  # fmt: skip
 
 
 def damaged(data: bytes, count: int):
@@ -95,6 +106,27 @@ def test_a_window_that_the_file_cannot_hold_takes_no_memory(tmp_path):
     bounded(read)
 
 
+def test_headers_of_damaged_volumes_are_refused_or_hold_what_they_name(tmp_path):
+    """What passes is read by OpenVDB, which takes minutes for lengths that no file can hold."""
+    path, vdb = tmp_path / "a.vdb", openvdb()
+    grid = vdb.FloatGrid()
+    grid.name = "density"
+    grid.copyFromArray(np.random.default_rng(1).random((6, 6, 6)).astype(np.float32))
+    vdb.write(str(path), [grid])
+
+    def read():
+        try:
+            vdb_header.check(path)
+            vdb.readAll(str(path))
+        except Exception as error:  # of OpenVDB: some thirty kinds
+            assert str(error)
+
+    read()
+    for data in damaged(path.read_bytes(), COUNT):
+        path.write_bytes(data)
+        bounded(read)
+
+
 def test_damaged_light_profiles_are_read_or_said_to_be_unreadable():
     def read(text):
         pixels, said = ies.profile_pixels(ies.Profile(text))
@@ -111,7 +143,7 @@ def test_damaged_figures_of_devices_are_measured_anew(tmp_path, monkeypatch):
     monkeypatch.setattr(device, "key", lambda: "this driver")
     device.write(tmp_path, device.MADE_UP["card"])
     assert device.read(tmp_path) == device.MADE_UP["card"]
-    whole = (tmp_path / "devices.json").read_bytes()
+    whole = (tmp_path / device.FILE).read_bytes()
     broken = [
         *damaged(whole, COUNT),
         b"[" * 100_000,
@@ -120,10 +152,31 @@ def test_damaged_figures_of_devices_are_measured_anew(tmp_path, monkeypatch):
         b'{"this driver": {"fetch": 1' + b"0" * 500 + b"}}",
     ]
     for data in broken:
-        (tmp_path / "devices.json").write_bytes(data)
+        (tmp_path / device.FILE).write_bytes(data)
 
         def read():
             found = device.read(tmp_path)
             assert found is None or isinstance(found, device.Device)
 
         bounded(read)
+
+
+def test_damaged_headers_of_slices_are_refused_in_a_line(tmp_path):
+    path = tmp_path / "part.exr"
+    pixels, whole = {"A.Combined": np.zeros((2, 2, 4), np.float32)}, json.dumps(HEADER).encode()
+
+    def read():
+        try:
+            read_sums(read_header(path))
+        except Refused as error:
+            assert path.name in str(error)
+
+    for data in damaged(whole, COUNT):
+        write_exr(path, pixels, {"candela": data.decode("latin-1")})
+        bounded(read)
+
+
+def test_names_of_chance_say_one_line_to_a_farm():
+    for data in damaged(b"Shot\nopenjd_fail: hacked\r\x1b[2K", COUNT):
+        said = one_line(data.decode("latin-1"))
+        assert said.isprintable() and len(said.splitlines()) <= 1

@@ -54,6 +54,15 @@ def test_light_does_not_come_through_the_surface_onto_a_bump(stage, lit):
     assert lit(0.6) < 1e-3
 
 
+@pytest.mark.parametrize("tilt", [1.7, 2.5])
+def test_no_light_reaches_a_normal_that_is_turned_below_the_surface(stage, lit, tilt):
+    """As by a normal map whose image is black, which says (-1, -1, -1)."""
+    stage.light("SUN", turn=(0.0, 1.2, 0.0), energy=np.pi, angle=0.0)
+    stage.world((1, 1, 1), 0.5)
+    assert lit(tilt, 4, engine="CYCLES") == 0.0
+    assert lit(tilt, 4) == 0.0
+
+
 @pytest.mark.parametrize("tilt", [0.3, 0.6])
 def test_the_world_lights_a_bumped_floor_as_in_cycles(stage, lit, tilt):
     stage.world((1, 1, 1), 0.5)

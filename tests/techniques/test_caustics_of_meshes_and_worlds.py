@@ -70,6 +70,7 @@ def test_under_an_even_sky_clear_glass_changes_nothing(stage, shape):
         slab(stage, glass(stage), 0.3, 0.32, half=1.0)
     else:
         ball(stage, glass(stage), radius=0.3, place=(0, 0, 0.8), segments=24)
-    images = stage.render(samples=16, size=(16, 16), bounces=4)
-    light = images["diffuse_direct"][..., 0] + images["diffuse_indirect"][..., 0]
-    assert light.mean() == pytest.approx(1.0, abs=0.04)
+    paths = ("diffuse_direct", "diffuse_indirect")
+    found = [stage.render(samples=16, size=(16, 16), bounces=4, seed=seed) for seed in range(4)]  # one seed errs by .02
+    light = np.mean([images[path][..., 0] for images in found for path in paths]) * len(paths)
+    assert light == pytest.approx(1.0, abs=0.04)

@@ -66,6 +66,17 @@ def test_close_to_a_mesh_few_samples_have_no_blotches(floor, cuts):
     assert np.sqrt(np.mean((found / expected - 1) ** 2)) < 0.04
 
 
+def test_rays_to_points_of_each_pixels_own_pass_glass(floor):
+    """A sheet of glass below the panel, whose light no caustics bring."""
+    panel(floor, z=0.25)
+    sheet = floor.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0)
+    floor.rectangle((-3, -3), (3, 3), 0.1, material=sheet).visible_camera = False
+    found = floor.render(16, SIZE)["diffuse_direct"][12:20, 12:20, 0].mean() * np.pi
+    assert "of each pixel's own" in str(floor.ledger.row("emissive_light").choices)
+    whole = model.irradiance(model.area((0, 0, 0.25), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi), np.zeros((1, 3)))[0]
+    assert 0.5 * whole < found < whole
+
+
 @pytest.mark.slow
 def test_emission_leaves_both_sides(floor):
     panel(floor, turn=(0, np.pi, 0), location=(0, 0, 4))
@@ -114,6 +125,17 @@ def test_a_mirror_shows_an_emitter_as_bright_as_it_is(stage):
     reach = np.maximum(np.abs(x), np.abs(y))
     np.testing.assert_allclose(found[reach < 0.45], RADIANCE, rtol=1e-4)
     assert (found[reach > 0.55] == 0).all()
+
+
+def test_narrow_gloss_below_a_wide_emitter_is_as_bright_as_it(stage):
+    """What points of the emitter and rays of the lobe find of it are shares of one whole."""
+    metal = stage.material("ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.2)
+    stage.floor(material=metal)
+    stage.camera_above(SPAN)
+    stage.glow = stage.material("ShaderNodeEmission", Strength=RADIANCE, Color=(1, 1, 1, 1))
+    panel(stage, half=4.0)
+    found = stage.render(16, SIZE)["glossy_direct"][8:-8, 8:-8, 0]
+    assert found.mean() == pytest.approx(RADIANCE, rel=0.01)
 
 
 def test_without_emission_the_technique_says_so(stage):

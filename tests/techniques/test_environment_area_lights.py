@@ -98,3 +98,14 @@ def test_auto_leaves_it_out_and_says_why(plain):
     plain.render(1, (8, 8))
     row = plain.ledger.row("environment_area_lights")
     assert (row.state, "rooms" in row.reason) == ("skipped", True)
+
+
+def test_a_large_map_is_averaged_by_solid_angle():
+    """1,024 rows become 512: of two rows that become one, each counts by its width in the sine of latitude."""
+    rows = np.random.default_rng(1).random((1024, 1, 3))
+    found = area_fit._resized(np.repeat(rows, 2 * area_fit.LEAST_ROWS, axis=1))
+    assert found.shape == (512, 256, 3)
+    width = np.diff(np.sin((np.arange(1025) / 1024 - 0.5) * np.pi))[:, None]
+    pairs = (rows[:, 0] * width).reshape(512, 2, 3).sum(axis=1) / width.reshape(512, 2, 1).sum(axis=1)
+    assert found[:, 0] == pytest.approx(pairs, rel=1e-9)
+    assert found[:, 200] == pytest.approx(pairs, rel=1e-9)

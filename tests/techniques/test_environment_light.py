@@ -67,6 +67,18 @@ def test_a_long_wall_hides_its_form_factor_of_the_sky(floor):
     assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
 
 
+def test_the_only_sample_has_no_hard_shadows_of_single_directions(floor):
+    """A wall's form factor as above, in means of columns of pixels, in which hard shadows would stay."""
+    floor.world()
+    wall = floor.mesh([(0, -300, 0), (0, 300, 0), (0, 300, 1), (0, -300, 1)], [(0, 1, 2, 3)])
+    wall.visible_camera = False
+    x, _ = places((64, 48), SPAN)
+    expected = (0.5 + 0.5 * np.abs(x) / np.hypot(1.0, x)).mean(axis=0)
+    found = diffuse(floor, 1, (64, 48))[..., 0].mean(axis=0)
+    assert floor.ledger.row("environment_light").counters["rays per pixel"] > 1
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.02
+
+
 def test_a_roof_over_everything_leaves_darkness(floor):
     floor.world()
     floor.blocker((-300, -300), (300, 300), 0.5)

@@ -17,6 +17,7 @@ from addon.grass.blades import Recipe
 from addon.grass.compression import LUMA
 from addon.grass.directions import Rings
 from addon.grass.generate import field_of
+from addon.grass.table import finer_ratios
 from addon.materials.compiled import Attribute
 from addon.materials.compiler import compile_material
 from addon.scene import uv_placed
@@ -136,21 +137,36 @@ def test_two_suns_add_up(stage):
     assert render(0, 1) == pytest.approx(render(0) + render(1), rel=1e-4, abs=1e-6)
 
 
-def test_a_view_of_the_patch_is_shown_texel_by_texel(stage):
-    """From above with the sun in a sampled direction: what numpy decodes, with the contrast that it lost."""
+@pytest.mark.parametrize("between", [False, True])
+def test_a_view_of_the_patch_is_shown_texel_by_texel(stage, between):
+    """From above with the sun in a sampled direction: what numpy decodes, with the contrast that it lost. Halfway
+    between two directions: the mean of both pictures, with the contrast that means of unlike pictures lose."""
     made = patches.load(SHIPPED)
     light = 5
     way = made.lights.vectors[light]
+    if between:
+        way = way + made.lights.vectors[light + 1]
+        polar = np.radians(35.0)  # of the ring that both lie on
+        way = np.array([*(way[:2] / np.linalg.norm(way[:2]) * np.sin(polar)), np.cos(polar)])
     ground(stage)
     stage.light("SUN", turn=Vector(way).to_track_quat("Z", "Y").to_euler(), energy=math.pi, angle=0.0)
     stage.camera_above(made.size)
     shown = stage.render(1, (64, 64))["combined"][..., :3]
-    picture = made.pictures(0)[light]
-    more = made.contrast[0, light]
-    excess = made.excess[0, light] * max(more - 1.0, 0.0) ** 1.5
-    more *= 1.0 + 2.3 * excess  # what cutting off takes from it
-    mean = made.picture_mean[0, light]
-    expected = np.maximum(mean + (picture - mean) * more, 0.0) / (1.0 + excess)
+    squares = 0.5 if between else 1.0  # sum of the squared weights of pictures
+    lost = (squares + made.light_alike[0] * (1.0 - squares)) ** 0.5
+
+    def decoded(light):
+        picture = made.pictures(0)[light]
+        more = made.contrast[0, light] / lost
+        excess = made.excess[0, light] * max(more - 1.0, 0.0) ** 1.5
+        more *= 1.0 + 2.3 * excess  # what cutting off takes from it
+        mean = made.picture_mean[0, light]
+        return np.maximum(mean + (picture - mean) * more, 0.0) / (1.0 + excess)
+
+    expected = decoded(light)
+    if between:
+        numbers, weights = made.finer_lights.weights(way)
+        expected = 0.5 * (expected + decoded(light + 1)) * (weights @ finer_ratios(made)[0, numbers])
     expected = np.roll(expected, (32, 32), axis=(0, 1))  # the picture's corner is half a tile off the origin
     assert np.abs(shown - expected).mean() < 0.01 * expected.mean()
 

@@ -45,13 +45,15 @@ def error(found, expected):
     return np.sqrt(((found - expected) ** 2).mean()) / expected.mean(), found.mean() / expected.mean() - 1
 
 
-@pytest.mark.parametrize("bounces", [1, 3])
-@pytest.mark.parametrize("points", [64, 1024])
-def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces, points):
-    """Everything sees everything: whatever is missing is a false shadow."""
+@pytest.mark.parametrize(
+    ("bounces", "points", "rays"), [(1, 64, 0), (3, 64, 0), (1, 1024, 0), (3, 1024, 0), (1, 64, 3)]
+)
+def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces, points, rays):
+    """Everything sees everything: whatever is missing is a false shadow. Rays correct virtual lights in groups, of
+    which each light belongs to one."""
     sphere(stage, stage.diffuse(0.5))
     stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
-    light = render(bounces, points=points, rays=0)
+    light = render(bounces, points=points, rays=rays)
     assert light.mean() == pytest.approx(0.5 * (1 - 0.5**bounces), rel=0.02)
     assert light.mean(axis=2).std() < 0.06 * light.mean()
 

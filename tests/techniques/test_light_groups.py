@@ -112,6 +112,19 @@ def test_passes_of_light_are_those_of_all_groups(grouped):
 
 
 @pytest.mark.slow
+def test_groups_share_out_the_pixels_of_bounced_light(grouped):
+    """So that their sum has the noise of one picture, and none of its light is lost."""
+    stage = grouped
+    plain = stage.written("CANDELA", 16, bounces=2)
+    names = ("Key", "Fill", "Plate", "Sky")
+    group(stage, *names)
+    own = stage.written("CANDELA", 16, bounces=2)
+    (said,) = stage.ledger.row("instant_radiosity").choices
+    assert said == "its light: in one of 4 pixels, because 4 light groups are added up"
+    np.testing.assert_allclose(own["Combined"].mean(axis=(0, 1)), plain["Combined"].mean(axis=(0, 1)), rtol=0.02)
+
+
+@pytest.mark.slow
 def test_a_picture_without_groups_is_drawn_once(grouped, monkeypatch):
     from addon.frame.run import Renderer
 

@@ -341,6 +341,19 @@ def test_glass_shows_the_fog_behind_it(stage):
 
 
 @pytest.mark.slow
+def test_glass_shows_what_fog_scatters_more_than_once(stage):
+    """A pane that bends nothing changes nothing; a third of this fog's light has been scattered more than once."""
+    lit_cube(stage, density=1.0)
+    mirrored_alone(stage)
+    once = stage.render(64, size=(8, 8), bounces=4)["combined"][..., 0].mean()
+    stage.scene.candela.airlight_bounces = 4
+    bare = stage.render(64, size=(8, 8), bounces=4)["combined"][..., 0].mean()
+    box(stage, stage.material("ShaderNodeBsdfGlass", IOR=1.0001, Roughness=0.0), (-2, -2, 1.2), (2, 2, 1.4))
+    seen = stage.render(64, size=(8, 8), bounces=4)["combined"][..., 0].mean()
+    assert bare > 1.2 * once and seen == pytest.approx(bare, rel=0.03)
+
+
+@pytest.mark.slow
 def test_fog_fades_what_a_mirror_shows(stage):
     stage.camera_above()
     mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
@@ -426,6 +439,21 @@ def test_a_cloud_of_albedo_one_in_even_light_is_hardly_to_be_seen(stage):
         missing.append(1.0 - stage.render(32, size=(4, 4), bounces=bounces)["combined"][..., :3].mean())
     assert missing[0] > missing[1] > 0.02
     assert missing[2] == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("lamp", ["sun", "point"])
+def test_thin_fog_above_a_lit_floor_scatters_what_the_floor_sends(stage, lamp):
+    """Half of all directions see the floor's radiance, so that fog of optical depth t sends half of t of it."""
+    stage.floor(half=500.0, material=stage.diffuse(0.8))
+    if lamp == "sun":
+        stage.light("SUN", energy=np.pi, angle=0.0)
+    else:  # so far off that the floor below the fog is lit evenly; its rays are followed to where they end
+        stage.light("POINT", (0, 0, 200), energy=4 * np.pi**2 * 200**2, shadow_soft_size=0.0)
+    box(stage, volume(stage, Color=(1, 1, 1, 1), Density=0.02), (-0.5, -0.5, 1.0), (0.5, 0.5, 1.5))
+    stage.camera_above(span=0.5)
+    stage.scene.candela.slot_indirect = "OFF"
+    seen = stage.render(16, size=(16, 16), bounces=1)["volume_indirect"][..., :3].mean()
+    assert seen == pytest.approx(0.02 * 0.5 * 0.8 / 2, rel=0.05)
 
 
 def test_fog_without_light_is_attenuation_alone(stage):

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.techniques.foggy_stage import absorber, box, fog
+from tests.techniques.foggy_stage import absorber, box, fog, volume
 
 RADIUS, ALBEDO, BOUNCES = 1.0, 0.7, 2
 TECHNIQUES = (
@@ -63,3 +63,21 @@ def test_a_medium_with_a_boundary_absorbs_light_between_surfaces(stage):
     direct, indirect = inside_a_ball(stage, "instant_radiosity")
     each = ALBEDO * passing(np.array([0.25, 0.5, 0.9]))
     assert indirect / direct == pytest.approx(each + each**2, rel=0.06)
+
+
+@pytest.mark.slow
+def test_cloth_that_is_lit_from_behind_lights_the_fog_before_it(stage):
+    """As a sheet that shines as much: of 1 W/m2 behind it, its albedo of .6 over pi leaves in front."""
+    stage.camera((0, 0, 8), (0, 0, 0), angle=0.5)
+    stage.world((0, 0, 0), 0.0)
+    turn = (0, np.pi / 2, 0)
+    box(stage, volume(stage, Color=(1, 1, 1, 1), Density=0.1), (0.02, -0.9, -0.9), (2, 0.9, 0.9))
+    cloth = stage.material("ShaderNodeBsdfTranslucent", Color=(0.6, 0.6, 0.6, 1))
+    sheet = stage.rectangle((-1, -1), (1, 1), material=cloth, turn=turn)
+    lamp = stage.light("SUN", turn=(0, -np.pi / 2, 0), energy=1.0, angle=0.0)
+    stage.scene.candela.airlight_bounces = 1
+    lit = stage.render(64, size=(16, 16), bounces=2)["volume_indirect"][..., 0].mean()
+    bpy.data.objects.remove(lamp)
+    sheet.data.materials[0] = stage.material("ShaderNodeEmission", Strength=0.6 / np.pi)
+    shone = stage.render(64, size=(16, 16), bounces=2)["volume_direct"][..., 0].mean()
+    assert lit == pytest.approx(shone, rel=0.05)

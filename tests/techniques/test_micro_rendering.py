@@ -1,6 +1,7 @@
 """Micro-rendering against closed forms, Cycles, and the laws that light obeys."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
 from addon.frame.run import Renderer
+from addon.lighting import point_runs
 from addon.snapshot import SnapshotCache, take
 from addon.techniques import make_registry, micro_rendering
 from addon.ui.properties import settings_of
@@ -212,6 +214,33 @@ def test_a_picture_is_gathered_in_blocks_that_fit_an_image(stage, render, monkey
     again = render_passes(stage.scene, "CANDELA", 1, 0, size=(24, 24), bounces=1).images["glossy_indirect"]
     np.testing.assert_array_equal(again, reflected)
     assert reflected.any() and 0 < max(sides) <= 60
+
+
+@pytest.mark.parametrize(("side", "within"), [(1, 0.01), (5, 0.06)])
+def test_white_metal_in_a_lit_sphere_is_as_bright_as_the_sphere(stage, side, within):
+    """Irradiance pi and albedo 1/2 give radiance 1/2 all around. Groups of points are drawn as one where they are as
+    large as a pixel of the lobe, and leave holes: twice as large ones took a fifth of the light."""
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    white = stage.principled(Base_Color=(1, 1, 1, 1), Metallic=1.0, Roughness=0.5)
+    stage.rectangle((-0.1, -0.1), (0.1, 0.1), -0.3, material=white)
+    stage.camera((0, 0, -0.1), (0, 0, 0), angle=0.4)
+    stage.scene.candela.slot_indirect, stage.scene.candela.micro_rendering_lobe_side = NAME, side
+    seen = render_passes(stage.scene, "CANDELA", 8, 0, size=(16, 16), bounces=1).images["glossy_indirect"]
+    assert seen[..., :3].mean() == pytest.approx(0.5, rel=within)
+
+
+def test_normals_of_points_are_those_of_the_smooth_surface():
+    """Between three corners, of a mesh that is stretched and of its mirror image."""
+    corners = np.array([[0.0, 0.6, 0.8], [0.6, 0.0, 0.8], [-0.8, 0.0, 0.6]])
+    mesh = SimpleNamespace(corner_normals=corners.astype(np.float32), triangle_corners=np.array([[0, 1, 2]]))
+    share = np.array([[0.2, 0.3], [0.5, 0.1]])
+    for stretched in (np.diag([2.0, 1.0, 1.0]), np.diag([-2.0, 1.0, 1.0])):
+        found = point_runs._shading_normals(mesh, stretched, np.array([0, 0]), share)
+        expected = np.stack([(1 - a - b) * corners[0] + a * corners[1] + b * corners[2] for a, b in share])
+        expected = expected @ np.linalg.inv(stretched)
+        expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+        np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 def test_one_triangle_and_nothing_are_drawn(stage, render):

@@ -10,8 +10,6 @@ from addon.gfx import context, images
 from addon.techniques import multires_radiosity
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def render(stage):
@@ -32,6 +30,17 @@ def counters():
     return next(row.counters for row in ledger.latest().rows if row.name == "multires_radiosity")
 
 
+@pytest.mark.parametrize("rays", [0, 2])
+def test_each_pixel_of_a_sphere_gathers_all_virtual_lights(stage, render, rays):
+    """As regions of one pixel, by few rays or by none: nothing hides anything."""
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    light = render(1, levels=0, rays=rays)
+    assert light.mean() == pytest.approx(0.25, rel=0.03)
+    assert light.mean(axis=2).std() < 0.1 * light.mean()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("bounces", [1, 3])
 def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces):
     """Every virtual light brings the same everywhere in a sphere, so that interpolation must not change it."""
@@ -42,6 +51,7 @@ def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, r
     assert light.mean(axis=2).std() < 0.06 * light.mean()
 
 
+@pytest.mark.slow
 def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage, render):
     stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
     corners = [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
@@ -56,6 +66,7 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     np.testing.assert_allclose(four_rows, wall_irradiance(height).reshape(16, 4).mean(axis=1), rtol=0.06)
 
 
+@pytest.mark.slow
 def test_regions_differ_little_from_the_gather_of_every_pixel_and_are_few(stage, render):
     """The same virtual lights, none of them traced."""
     corner(stage)
@@ -68,6 +79,7 @@ def test_regions_differ_little_from_the_gather_of_every_pixel_and_are_few(stage,
     assert np.sqrt(((regions - pixels) ** 2).mean()) < 0.03 * pixels.mean()
 
 
+@pytest.mark.slow
 def test_light_that_is_not_traced_passes_walls(stage, render):
     """Each virtual light only adds where its shadow is not asked for."""
     corner(stage)
@@ -76,12 +88,14 @@ def test_light_that_is_not_traced_passes_walls(stage, render):
     assert render(2, samples=4, rays=0).mean() > 1.01 * traced.mean()
 
 
+@pytest.mark.slow
 def test_every_size_of_picture_has_its_regions(stage, render):
     corner(stage)
     for size in ((1, 1), (7, 3), (33, 17)):
         assert np.isfinite(render(1, samples=2, size=size, levels=5)).all()
 
 
+@pytest.mark.slow
 def test_pictures_narrower_than_a_group_of_threads_have_their_light_in_one_sample(stage, render):
     corner(stage)
     for size in ((1, 1), (3, 40), (40, 3)):
@@ -89,6 +103,7 @@ def test_pictures_narrower_than_a_group_of_threads_have_their_light_in_one_sampl
         assert np.isfinite(light).all() and light.mean() > 0
 
 
+@pytest.mark.slow
 def test_regions_without_a_list_gather_the_same(stage, render, monkeypatch):
     """What Metal does."""
     corner(stage)
@@ -101,12 +116,14 @@ def test_regions_without_a_list_gather_the_same(stage, render, monkeypatch):
     np.testing.assert_allclose(render(2, **settings), listed, rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_picture_whose_atlas_is_too_large_for_an_image_gathers_every_pixel(gpu_context):
     most = min(images.most_side(), 1 << multires_radiosity.REGION_BITS)
     assert multires_radiosity.fitting_levels((most - 8, 4), 3) == 0
     assert multires_radiosity.fitting_levels((most // 2, 4), 3) == 3
 
 
+@pytest.mark.slow
 def test_without_near_bounces_only_what_close_surfaces_reflect_more_than_once_is_missing(stage, render):
     corner(stage, albedo=0.8)
     once = [render(1, virtual_lights=32, near_bounces=follow) for follow in (True, False)]

@@ -11,7 +11,17 @@ from addon.gfx import images, passes
 from addon.snapshot.bound_points import bound
 from addon.snapshot.own_settings import own_settings
 from addon.surfaces import geodesic, reflection_edits
-from addon.surfaces.reflection_edits import EUCLIDEAN, MOST_LAYERS, SOLVE, Constraint, Region, edit_table, mirrored
+from addon.surfaces.reflection_edits import (
+    EUCLIDEAN,
+    MOST_LAYERS,
+    PAINTED,
+    SOLVE,
+    Constraint,
+    Region,
+    edit_table,
+    influence,
+    mirrored,
+)
 from bench.reflection_costs import torus
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -81,6 +91,16 @@ def degrees_between(a, b):
 
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
+
+
+def test_influence_falls_smoothly_from_one_to_zero_across_the_border():
+    """1 - (3 t^2 - 2 t^3) across the border, with no slope at either end; without a border a step."""
+    t = np.linspace(-1.0, 2.0, 61)
+    inside = np.clip(t, 0.0, 1.0)
+    found = influence(Region(EUCLIDEAN, np.zeros(3), 2.0, 0.5), 1.5 + 0.5 * t)
+    assert found == pytest.approx(1.0 - 3.0 * inside**2 + 2.0 * inside**3, abs=1e-12)
+    assert influence(Region(EUCLIDEAN, np.zeros(3), 2.0, 0.0), np.array([1.99, 2.01])).tolist() == [1.0, 0.0]
+    assert influence(Region(PAINTED, np.zeros(3), 2.0, 0.5), np.array([-1.0, 0.25, 7.0])).tolist() == [0.0, 0.25, 1.0]
 
 
 def test_one_constraint_is_the_shortest_way_everywhere():
@@ -706,16 +726,60 @@ def test_the_edit_of_glass_stays_however_many_views_are_frozen(stage, monkeypatc
     assert np.abs(found - plain).max() < 1e-3
 
 
-@pytest.mark.parametrize("degrees", [15, 60])
-def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees):
-    """Edited rays that point into the ball show what is behind it, not its inside."""
-    ball = sphere(stage, stage.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)), rings=24)
+def test_freeze_says_which_closed_glass_is_too_many(stage, monkeypatch):
+    """Closed objects with a constraint of Refraction take a number each; mirrors and open glass take none."""
+    from addon.techniques import reflection_editing
+
+    monkeypatch.setattr(reflection_editing, "MOST_FROZEN", 2)
+    glass = stage.material("ShaderNodeBsdfRefraction", IOR=1.4, Roughness=0.0)
+    stage.world((1, 1, 1), 1.0)
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.4)
+
+    def told():
+        stage.render(1, (16, 16), bounces=2)
+        return [note for note in stage.ledger.notes if "not through more" in note.text]
+
+    balls = [sphere(stage, glass, rings=8) for _ in range(4)]
+    for k, ball in enumerate(balls):
+        ball.name = f"Ball {k}"
+        constrain(ball, (0, -1, 0), (3, 5, 2), (0, -4, 0))
+        ball.candela.reflection_editing_freeze = True
+    pane = stage.rectangle((-1, -1), (1, 1), material=glass)
+    constrain(pane, (0, 0, 0), (3, 5, 2), (0, -4, 0))
+    pane.candela.reflection_editing_freeze = True
+    for one in (*balls[2:], pane):
+        one.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    assert not told()
+    for one in balls:
+        one.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    (note,) = told()
+    assert note.subject == "Object 'Ball 2' and 1 more"
+
+
+@pytest.mark.parametrize(("degrees", "roughness"), [(15, 0.0), (60, 0.0), (60, 0.5)])
+def test_a_ball_in_an_even_world_stays_white_up_to_its_rim(stage, degrees, roughness):
+    """Edited rays that point into the ball show what is behind it; samples of the world take no part."""
+    ball = sphere(stage, stage.principled(Metallic=1.0, Roughness=roughness, Base_Color=(1, 1, 1, 1)), rings=24)
     stage.world((1, 1, 1), 1.0)
     stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
     after = about((0, 0, 1), degrees) @ np.array([0.0, -1.0, 0.0])
     constrain(ball, (0, -1, 0), tuple(np.array([0, -1, 0]) + 5 * after), (0, -4, 0))
-    found = stage.render(2, (48, 48), bounces=2)["combined"][..., :3]
-    assert found.mean() == pytest.approx(1.0, abs=2e-3) and found.min() > 0.9
+    found = stage.render(4 if roughness else 2, (48, 48), bounces=2)["combined"][..., :3]
+    assert found.mean() == pytest.approx(1.0, abs=2e-3) and found.min() > (0.8 if roughness else 0.9)  # noise of gloss
+
+
+def test_an_edit_of_frosted_glass_loses_no_light(stage):
+    """An even world looks the same through a rough ball whose light is turned by 60 degrees where it leaves."""
+    ball = sphere(stage, stage.material("ShaderNodeBsdfRefraction", IOR=1.4, Roughness=0.5), rings=24)
+    stage.world((1, 1, 1), 1.0)
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
+    plain = stage.render(16, (32, 32), bounces=4)["combined"][..., :3].mean()
+    after = about((0, 0, 1), 60) @ np.array([0.0, 1.0, 0.0])
+    constrain(ball, (0, -1, 0), tuple(np.array([0, -1, 0]) + 5 * after), (0, -4, 0))
+    ball.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    ball.candela.reflection_editing_constraints[0].triangle = -1
+    edited = stage.render(16, (32, 32), bounces=4)["combined"][..., :3].mean()
+    assert edited == pytest.approx(plain, rel=0.02)
 
 
 def test_a_target_follows_the_object_that_it_is_bound_to(stage):

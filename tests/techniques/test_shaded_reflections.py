@@ -4,6 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.frame.shares import Turns
+from addon.techniques.shaded_reflections import ShadedReflections
+
 from .conftest import places
 
 SIZE = (24, 24)
@@ -246,3 +249,84 @@ def test_one_sample_sees_through_a_pane_without_grain(stage):
     found = stage.render(1, (16, 16), bounces=4)["combined"][..., :3]
     assert found.mean() == pytest.approx(0.96**2, rel=0.03)
     assert found.min() > 0.9 and found.max() < 1.0
+
+
+@pytest.mark.parametrize("beside, gathered", [(0.42, True), (0.05, False)])
+def test_rough_gloss_is_gathered_but_beside_smooth_metal(stage, beside, gathered):
+    """Virtual lights spread what smooth metal mirrors; rays of the floor's gloss see it as it is."""
+    stage.rectangle((-9, -9), (9, 9), material=stage.principled(Metallic=1.0, Roughness=0.6))
+    metal = stage.principled(Metallic=1.0, Roughness=beside)
+    stage.rectangle((-1, -1), (1, 1), material=metal, location=(3, 0, 1), turn=(0, np.radians(-60), 0))
+    stage.light("AREA", (0, 0, 6), size=2.0)
+    stage.camera_above()
+    stage.render(1, (12, 12), bounces=2)
+    assert any("roughness" in one for one in stage.ledger.row("shaded_reflections").choices) == gathered
+
+
+def coated(stage, **coat):
+    """Red metal under a clear coat, seen at a slant."""
+    values = {"Metallic": 1.0, "Roughness": 0.35, "Base_Color": (0.8, 0.1, 0.1, 1), "Coat_Weight": 1.0, **coat}
+    stage.rectangle((-9, -9), (9, 9), material=stage.principled(**values))
+    stage.camera((0.0, -6.0, 2.5), (1.17, 0, 0), angle=0.3)
+
+
+def apart(monkeypatch, yes):
+    monkeypatch.setattr(ShadedReflections, "follows_coats", lambda *_: yes)
+
+
+def test_one_sample_shows_a_coat_and_what_lies_below_it_without_grain(stage, monkeypatch):
+    """Under an even sky each of the two reflects its own colour, wherever its rays go."""
+    coated(stage, Roughness=0.1)
+    stage.world(strength=1.0)
+    whole = stage.render(1, (16, 16), bounces=2)["combined"][4:-4, 4:-4, :3]
+    apart(monkeypatch, False)
+    chosen = stage.render(1, (16, 16), bounces=2, seed=2)["combined"][4:-4, 4:-4, :3]
+    many = stage.render(32, (16, 16), bounces=2)["combined"][4:-4, 4:-4, :3]
+    own, before = (np.square(one - many).mean((0, 1))[1:] for one in (whole, chosen))
+    assert (own < 0.2 * before).all(), (own, before)
+    assert whole.mean((0, 1)) == pytest.approx(many.mean((0, 1)), rel=0.02)
+
+
+@pytest.mark.parametrize("coat", [{"Coat_Roughness": 0.1}, {"Coat_Roughness": 0.03, "Coat_Weight": 0.4}])
+def test_a_coat_that_is_drawn_apart_reflects_lamps_as_before(stage, monkeypatch, coat):
+    """One that rays find and one that light samples alone do."""
+    coated(stage, **coat)
+    stage.light("POINT", (-0.3, 6.0, 2.5), energy=100, shadow_soft_size=0.5)
+    stage.light("POINT", (0.5, 5.0, 2.5), energy=10, shadow_soft_size=0.0)
+    found = []
+    for yes in (True, False):
+        apart(monkeypatch, yes)
+        images = [stage.render(32, (16, 16), bounces=1, seed=seed) for seed in (1, 2)]
+        found.append(np.mean([one["combined"][..., :3].mean((0, 1)) for one in images], axis=0))
+    assert found[0] == pytest.approx(found[1], rel=0.02)
+
+
+@pytest.mark.parametrize("seen, rests", [("ShaderNodeBsdfGlass", [False, True]), ("ShaderNodeBsdfGlossy", [True])])
+def test_what_is_seen_through_glass_has_all_its_bounces_in_each_sample(stage, monkeypatch, seen, rests):
+    """Which face mirrors is chance: of a bounce that the first sample shows nothing of, more may come. (Wine in a thick
+    glass: squared error .077 at 16 samples while such bounces rested, beside .042 at 4.)"""
+    found, begin = [], Turns.begin
+
+    def told(self, frame, names, may_rest=True):
+        begin(self, frame, names, may_rest)
+        if isinstance(self._technique, ShadedReflections):
+            found.append(self.may_rest)
+
+    monkeypatch.setattr(Turns, "begin", told)
+    stage.rectangle((-1, -1), (1, 1), material=stage.material(seen, Roughness=0.0))
+    stage.world()
+    stage.camera_above()
+    stage.render(8, (8, 8), bounces=4)
+    assert found[: len(rests)] == rests
+
+
+@pytest.mark.parametrize(("roughness", "rays"), [(0.5, False), (0.35, True)])
+def test_lobes_that_none_are_as_smooth_as_take_no_rays(stage, roughness, rays):
+    """Rougher lobes than .4 are gathered, so without smoother ones no pass of rays is made."""
+    stage.rectangle((-9, -9), (9, 9), material=stage.principled(Roughness=roughness))
+    ceiling(stage, stage.material("ShaderNodeEmission", Strength=1.0))
+    stage.camera_above()
+    assert reflected(stage.render(2, SIZE, bounces=2)).max() > 0
+    row = stage.ledger.row("shaded_reflections")
+    assert any("none, because no material is smoother" in one for one in row.choices) != rays
+    assert bool(row.counters.get("passes")) == rays

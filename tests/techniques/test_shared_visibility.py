@@ -5,8 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.gfx import context, images
+from addon.gfx import context, images, passes
+from addon.gfx.struct import Block
 from addon.lighting import shared_visibility
+from addon.scene.view import VIEW
 from tests.techniques.test_shadows import HEIGHT, irradiance
 from tests.techniques.test_vssm import EDGE, floor  # noqa: F401 - a fixture
 
@@ -64,6 +66,36 @@ def test_five_lights_are_the_sum_of_each(large, most, monkeypatch):
     assert lights == 5
     assert np.sqrt(((found - expected) ** 2).mean()) < 0.005 * expected.max()
     assert found.mean() == pytest.approx(expected.mean(), rel=2e-3)
+
+
+def test_between_lookups_visibility_is_bilinear(gpu_context):
+    """Of four lights, one above the other, on a plane on which all cells lie and know all lights."""
+    side, rate = 9, shared_visibility.RATE
+    rng = np.random.default_rng(1)
+    points = side // rate + 2
+    seen = rng.random((points, points, 4))
+    place = np.zeros((side, side, 4))
+    place[..., 1], place[..., 0] = np.mgrid[:side, :side]
+    place[..., 3] = 1.0
+    view = Block(VIEW, **(dict.fromkeys(VIEW.fields, 0) | {
+        "eye": (0.0, 0.0, 5.0, 1.0), "frame": (-1.0, 1.0, -1.0, 1.0), "film": (side, side, 0.1, 100.0),
+    }))  # fmt: skip
+    textures = {
+        "surface_position": place, "surface_normal": np.zeros((side, side, 4)), "visibility": seen,
+        "cells": np.broadcast_to((0.0, 0.0, 0.0, 255.0), (points - 1, points - 1, 4)),
+    }  # fmt: skip
+    with images.borrowed(side, 4 * side, "R32F") as target:
+        passes.compute(
+            shared_visibility.MARKING, (side, side), blocks={"film_view": view}, constants={"light_count": 4},
+            textures={name: images.upload(pixels) for name, pixels in textures.items()},
+            images={"pixel_visibility": target.colors[0]},
+        )  # fmt: skip
+        found = images.read(target.colors[0])[..., 0].reshape(4, side, side)
+    cell, share = np.divmod(np.arange(side), rate)
+    between = np.zeros((side, points))
+    between[np.arange(side), cell], between[np.arange(side), cell + 1] = 1 - share / rate, share / rate
+    expected = np.einsum("yj,xi,jik->kyx", between, between, seen)
+    np.testing.assert_allclose(found, expected, atol=1e-5)
 
 
 def fence(stage):

@@ -8,6 +8,7 @@ import pytest
 from addon.gfx import context, images, passes
 from addon.kernels import diffusion
 from addon.kernels.diffusion import Medium
+from addon.scene.envelope import AT_ONCE, normal_envelope
 from addon.scene.pieces import octahedral_with_lift
 from addon.scene.scatter_surface import Surface
 
@@ -212,3 +213,32 @@ def test_points_of_a_smooth_ball_are_lifted_as_its_pixels_are():
     assert lift == pytest.approx((radius**2 - reach**2) / reach, abs=1e-9)
     assert (replace(ball, normals=-ball.normals).cells(64)[3] < lift + 1e-9).all()
     assert not replace(ball, lifted=False).cells(64)[3].any()
+
+
+def test_the_points_of_a_cell_are_all_over_it():
+    """A square of two triangles in 16 cells: the points of each are apart from each other, and their mean is that of
+    its part of the cloud."""
+    square = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0, 1, 0)]], float)
+    up = np.broadcast_to((0.0, 0.0, 1.0), (2, 3, 3))
+    flat = Surface(square, up, np.full(2, 0.5), np.zeros((2, 3, 2)), np.zeros(2, int), 1.0, 1.0)
+    place, *_, (cloud, _, cell) = flat.cells(16)
+    for k, count in enumerate(np.bincount(cell)):
+        assert len(np.unique(place[k, 1:], axis=0)) >= min(count, place.shape[1]) - 1
+    mean = np.array([cloud[cell == k].mean(axis=0) for k in range(16)])
+    assert np.linalg.norm(place[:, 1:].mean(axis=1) - mean, axis=1).mean() < 0.05  # a cell is .25 wide
+
+
+def test_a_face_reaches_above_its_corners_as_far_as_all_three_normals_say():
+    """Of a triangle in the plane z = 0 whose normals all lean by .1 along x, the corner furthest along x is .1 times
+    the width above the corners at x = 0, and they are as far below it; upright normals say 0. The same wherever a
+    triangle stands in a list that is cut in pieces."""
+    places = np.array([(0, 0, 0), (2, 0, 0), (0, 1, 0)], float)
+    lean = np.array([0.1, 0.0, np.sqrt(0.99)])
+    one = normal_envelope(places, np.tile(lean, (3, 1)), np.array([[0, 1, 2]]))
+    assert one == pytest.approx(np.array([(0.2, 0.0), (0.0, 0.2), (0.2, 0.0)]), abs=1e-7)
+    assert not normal_envelope(places, np.tile([0.0, 0.0, 1.0], (3, 1)), np.array([[0, 1, 2]])).any()
+    mixed = np.array([lean, (0, 0, 1), lean])
+    assert not normal_envelope(places, mixed, np.array([[0, 1, 2]])).any()
+    many = AT_ONCE + 1
+    long = normal_envelope(np.tile(places, (many, 1)), np.tile(lean, (3 * many, 1)), np.arange(3 * many).reshape(-1, 3))
+    assert (long.reshape(many, 3, 2) == one).all()

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from addon.scene.overview import overview
+
 
 def ramp(stage, factor_of, ends):
     """An emissive material whose strength runs between `ends` over a value that `factor_of` gives of its tree."""
@@ -65,3 +67,15 @@ def test_a_panel_that_shines_to_one_side_lights_that_side(stage, down, mirrored)
     for path in ("diffuse_direct", "glossy_direct"):
         assert (cycles[path].max() > 0.1) == down
         assert ours[path][..., 0].mean() == pytest.approx(cycles[path][..., 0].mean(), rel=0.03, abs=1e-6)
+
+
+@pytest.mark.parametrize("backward", [(0.0, 0.6, 0.8), (0.6, 0.64, 0.48)])
+def test_an_overview_shows_the_whole_box_from_beyond_it(backward):
+    """All corners within the picture, its middle in the middle, the eye a diagonal away on the side it looks from."""
+    low, high, backward = np.array([-1.0, 0.0, 2.0]), np.array([3.0, 1.0, 4.0]), np.array(backward)
+    view = overview(low, high, backward)
+    corners = np.array([[x, y, z, 1] for x in (-1, 3) for y in (0, 1) for z in (2, 4)])
+    for row in ("row_x", "row_y"):
+        assert np.abs(corners @ view[row]).max() <= 1.0
+        assert np.append((low + high) / 2, 1) @ view[row] == pytest.approx(0.0, abs=1e-12)
+    assert (np.array(view["eye"][:3]) - (low + high) / 2) @ backward == pytest.approx(np.linalg.norm(high - low))

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.eye import optics
+from addon.eye import optics, pupil, spectrum
 from addon.frame.ledger import RAN, SKIPPED
 from addon.gfx import images as gpu_images
 from addon.gfx import library
@@ -178,6 +178,106 @@ def test_a_bright_field_makes_the_pupil_small(night):
     assert diameter() < dark - 1.0
     night.scene.camera.data.candela.eye_pupil = 6.0
     assert diameter() == pytest.approx(6.0)
+
+
+def diameter_of(stage):
+    """Of the pupil that the last picture's pattern is of, mm."""
+    return stage.renderer.frame.service(_point_spread())._pattern[0][3]
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.0])
+def test_a_pupil_adapts_in_rendered_frames_from_the_luminance_before(night, speed):
+    """Out of the dark at second 1, at any frame alone; by the scene's clock, whether or not the eye moves by itself."""
+    settings, scene = night.scene.camera.data.candela, night.scene
+    settings.eye_restlessness, settings.eye_speed, settings.glare_luminance = 0.0, speed, 1000.0
+    settings.eye_before, settings.eye_changed = 0.01, 1.0
+    lens = {}
+    for frame in (240, 12, 36, 29):
+        scene.frame_set(frame)
+        images = night.render(size=SIZE)
+        lens[frame] = images["glare"]
+        mean = 1000.0 * (images["combined"][..., :3] @ np.array([0.2126, 0.7152, 0.0722])).mean()
+        before, after = (float(pupil.mean_diameter(light, settings.eye_age)) for light in (0.01, mean))
+        expected = pupil.adapting(frame / 24 - 1.0, before, after)
+        assert diameter_of(night) == pytest.approx(expected, abs=0.02), frame  # mm; of a luminance in steps
+    assert before - after > 2.0
+    settings.eye_before = 0.0
+    for frame, by_hand in ((240, 0.0), (12, before)):
+        scene.frame_set(frame)
+        settings.eye_pupil = by_hand
+        same = night.render(size=SIZE)["glare"]
+        assert np.sqrt(np.mean((same - lens[frame]) ** 2) / np.mean(same**2)) < 1e-3
+    assert np.sqrt(np.mean((lens[12] - lens[240]) ** 2) / np.mean(lens[12] ** 2)) > 5e-3
+
+
+def halo_of(stage, kind, kelvin):
+    """(72, 72, 3) glare beside a lamp of one pixel over the lamp's own light, and the degrees of 575 nm by texels."""
+    settings = stage.scene.camera.data.candela
+    settings.eye_spectrum, settings.eye_kelvin = kind, kelvin
+    images = stage.render(size=(72, 72))
+    lamp = images["combined"][36, 36, :3].astype(np.float64)
+    halo = (images["glare"] - images["combined"])[..., :3] / (lamp * (1.0 - 1.0 / lamp.max()))
+    halo[34:39, 34:39] = 0.0
+    return halo
+
+
+@pytest.mark.parametrize("kelvin", [2400.0, 5800.0])
+def test_the_halo_of_a_glowing_body_has_the_colours_of_its_spectrum(stage, kelvin):
+    """A lamp of one pixel whose colour a Blackbody node has: the mean over circles of its glare is that of one
+    wavelength, at all of them, weighed by Planck's law. *By Colour* finds nearly the same by itself."""
+    lamp = stage.material("ShaderNodeEmission", Strength=4000.0)
+    nodes = lamp.node_tree.nodes
+    heat = nodes.new("ShaderNodeBlackbody")
+    heat.inputs["Temperature"].default_value = kelvin
+    lamp.node_tree.links.new(heat.outputs[0], next(n for n in nodes if n.type == "EMISSION").inputs["Color"])
+    stage.rectangle((0.0, 0.0), (4 / 72, 4 / 72), material=lamp)
+    stage.camera_above()
+    settings = stage.scene.camera.data.candela
+    settings.glare_mode, settings.eye_side, settings.glare_magnification = "CONVOLUTION", "512", 40.0
+    settings.eye_pupil, settings.eye_restlessness, settings.eye_lashes, settings.eye_scatter = 8.0, 0.0, 0.0, 0.0
+    settings.eye_fibres = 0.8  # a ring, of which the inner rim is blue
+    own = halo_of(stage, "BLACKBODY", kelvin)
+    service = stage.renderer.frame.service(_point_spread())
+    fine = gpu_images.read(service._pattern[1].aperture)[..., 0].astype(np.float64)
+    light = optics.intensity(optics.field(fine.reshape(512, 2, 512, 2).mean((1, 3)), 0.25))
+    expected = circles(light, kelvin, service._kernel[1].scale)
+    y, x = np.mgrid[0:72, 0:72] - 36
+    ring = np.round(np.hypot(x, y)).astype(int)
+
+    def means(image):
+        return np.stack([np.bincount(ring.ravel(), image[..., k].ravel()) for k in range(3)], axis=-1)
+
+    beyond = slice(9, 36)  # the core's rim is at 8.8 pixels
+    found, wanted = means(own)[beyond], means(expected[ring])[beyond]
+    assert np.abs(found - wanted).max(axis=0) / wanted.max(axis=0) == pytest.approx(0.0, abs=0.05)
+    by_colour, even = (means(halo_of(stage, kind, kelvin))[beyond] for kind in ("COLOUR", "EQUAL"))
+    away, of_even = (np.abs(one - wanted).sum() / wanted.sum() for one in (by_colour, even))
+    assert np.abs(found - wanted).sum() / wanted.sum() < 0.03  # means over circles of pixels, of texels
+    assert away < 0.035 and (of_even > 2.0 * away or kelvin > 5000.0), (away, of_even)  # the sun's is nearly even
+
+
+def circles(light, kelvin, scale):
+    """(60, 3) weights of a kernel's pixels by their distance from its middle, from the pattern of 575 nm, (side, side):
+    the sum over wavelengths of its mean over circles, at their share of the distance, by Planck's law."""
+    side = len(light)
+    y, x = np.mgrid[0:side, 0:side] - side // 2
+    away = np.hypot(x, y)
+    mean = np.bincount(away.round().astype(int).ravel(), light.ravel()) / np.bincount(away.round().astype(int).ravel())
+    metres = spectrum.wavelength((np.arange(390) + 0.5) / 390) * 1e-9
+    power = metres**-5 / np.expm1(6.62607015e-34 * 299792458.0 / (metres * 1.380649e-23 * kelvin))
+    matched = power[:, None] * (spectrum.xyz(1e9 * metres) @ spectrum.TO_REC709.T)
+    texels = np.arange(0.5, 180.0, 0.5)
+    share = 575e-9 / metres
+    seen = np.interp(texels[:, None] * share, np.arange(len(mean)), mean) @ (matched * share[:, None] ** 2)
+    usable = optics.usable_radius(side)
+    fade = np.clip((usable - texels) / ((1 - optics.FADE_FROM) * usable), 0, 1)
+    seen = seen.clip(0.0) * (fade * fade * (3 - 2 * fade))[:, None]
+    seen /= (seen * texels[:, None]).sum(axis=0) * 2 * np.pi * 0.5  # all of it, over texels of half a unit's width
+    centres = (
+        np.arange(60)[:, None] * scale.per_pixel + (np.arange(16) + 0.5) / 16 * scale.per_pixel - 0.5 * scale.per_pixel
+    )
+    over = np.stack([np.interp(np.abs(centres), texels, seen[:, k]).mean(axis=1) for k in range(3)], axis=-1)
+    return over * scale.per_pixel**2
 
 
 @pytest.mark.parametrize("change", [{}, {"film_transparent": True}, {"border": True}])

@@ -224,6 +224,21 @@ def test_what_stands_in_a_solid_is_seen_through_what_that_absorbs(stage, slot):
     np.testing.assert_allclose(seen / seen[2], np.exp(-0.6 * np.array([1.0, 2.0, 0.0])), rtol=0.01)
 
 
+@pytest.mark.parametrize("slot", ["AUTO", "OFF"])
+def test_a_drink_that_reaches_into_the_walls_of_its_glass_absorbs_between_them(stage, slot):
+    """Its faces stand a centimetre within panes of clear glass, as they do for glass and drink to touch."""
+    clear, drink = glass(stage, ior=1.3), glass(stage, ior=1.3)
+    fill(drink.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.5, 0.0, 1.0, 1.0), Density=2.0)
+    box(stage, clear, (-1, -1, 0.4), (1, 1, 0.5))
+    box(stage, clear, (-1, -1, -0.5), (1, 1, -0.4))
+    box(stage, drink, (-0.99, -0.99, -0.41), (0.99, 0.99, 0.41))
+    stage.rectangle((-1, -1), (1, 1), -0.6, material=stage.material("ShaderNodeEmission", Strength=3.0))
+    stage.camera_above(1.0)
+    stage.scene.candela.slot_reflection = slot
+    seen = stage.render(8, (16, 16), bounces=4)["combined"][4:12, 4:12, :3].mean(axis=(0, 1))
+    np.testing.assert_allclose(seen / seen[2], np.exp(-0.82 * np.array([1.0, 2.0, 0.0])), rtol=0.02)
+
+
 def test_scenes_without_glass_pay_nothing(stage):
     stage.floor(material=stage.principled())
     stage.light("SUN")

@@ -4,6 +4,11 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.gfx import images
+from addon.materials.energy import energy_texture
+from addon.scene.world_tree import WorldTree
+from addon.snapshot import SnapshotCache, take
+
 
 def tree_of(stage):
     """A world with an empty tree: (tree, its output node)."""
@@ -76,6 +81,23 @@ def ball_before_the_sky(stage):
     for k, turn in enumerate(((0.3, 0, 0), (1.5, 0, 0.4), (2.2, 0.5, 0))):
         stage.rectangle((-0.4, -0.4), (0.4, 0.4), material=white, location=(k - 1.0, 0, 0), turn=turn)
     stage.camera((0.0, -4.0, 0.8), (1.4, 0.0, 0.0))
+
+
+def test_a_texel_of_the_map_that_lights_has_what_its_direction_shows(stage):
+    """A world that is as red, green and blue as its direction points along x, y and z, by equal steps of angle."""
+    tree, output = tree_of(stage)
+    place = add(tree, "ShaderNodeTexCoord").outputs["Generated"]
+    inside = add(tree, "ShaderNodeVectorMath", {1: (0.5,) * 3, 2: (0.5,) * 3}, {0: place}, operation="MULTIPLY_ADD")
+    background = add(tree, "ShaderNodeBackground", links={0: inside.outputs[0]})
+    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    stage.camera_above(4.0)
+    snapshot = take(bpy.context.evaluated_depsgraph_get(), SnapshotCache(), 8, 8)
+    found = WorldTree(snapshot.world, snapshot.images, images.upload(energy_texture(False))).bake()
+    height, width = found.shape[:2]
+    latitude = ((np.arange(height) + 0.5) / height - 0.5)[:, None] * np.pi
+    azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2 * np.pi
+    along = np.cos(latitude) * np.cos(azimuth), np.cos(latitude) * np.sin(azimuth), np.sin(latitude) + 0 * azimuth
+    np.testing.assert_allclose(found, 0.5 + 0.5 * np.stack(along, axis=-1), atol=1e-4)
 
 
 @pytest.mark.slow

@@ -65,6 +65,14 @@ def test_pictures_show_the_frame_and_what_is_set(camera):
     ]  # fmt: skip
 
 
+def test_an_image_of_the_artists_own_stays_whatever_its_name(camera):
+    own = bpy.data.images.new(eye_panel.GLARE, 4, 4, float_buffer=True)
+    for _ in range(2):
+        assert bpy.ops.candela.eye_pictures() == {"FINISHED"}
+    assert tuple(own.size) == (4, 4) and own.packed_file is None
+    assert len([image for image in bpy.data.images if image.name.startswith(eye_panel.GLARE)]) == 2
+
+
 def test_without_its_core_the_kernel_holds_what_is_scattered(camera):
     bpy.ops.candela.eye_pictures(whole=False)
     share = pixels_of(eye_panel.GLARE)[..., :3].sum(axis=(0, 1))

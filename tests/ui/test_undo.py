@@ -110,9 +110,10 @@ def test_what_an_operator_makes_is_a_step(undoable, call):
     assert blocks() == made
 
 
-def test_an_image_beside_one_of_the_artists_own_is_a_step_and_one_only(undoable):
-    """An image of bytes takes no light: it stays as it is, whatever its name."""
-    own = bpy.data.images.new(NAME, 4, 4)
+@pytest.mark.parametrize("float_buffer", [False, True])
+def test_an_image_beside_one_of_the_artists_own_is_a_step_and_one_only(undoable, float_buffer):
+    """An artist's image stays as it is, whatever its name: one of bytes, or a map that was painted."""
+    own = bpy.data.images.new(NAME, 4, 4, float_buffer=float_buffer)
     push("Own")
     picture = np.full((8, 8, 3), 2.0, np.float32)
     shown = [shown_images.show(bpy.context, NAME, picture).name for _ in range(2)]

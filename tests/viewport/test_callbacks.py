@@ -10,6 +10,7 @@ from mathutils import Matrix
 
 from addon import viewport
 from addon.gfx import context, images
+from addon.viewport import chosen
 from tests.viewport.region import SIZE
 
 
@@ -197,6 +198,24 @@ def test_objects_of_a_collection_whose_eye_is_closed_are_left_out(window):
         (kept,) = viewport._viewports.values()
         seen.append(len(kept._snapshot.instances))
     assert seen == [seen[0], seen[0] - 1, seen[0]]
+
+
+def test_what_is_compiled_ahead_is_what_the_region_would_show(window):
+    """Through the scene's camera, with its lens, and without shadow catchers."""
+    window.scene.camera.data.dof.use_dof = True
+    window.scene.camera.data.clip_end = 77.0
+    bpy.data.objects["Cube"].is_shadow_catcher = True
+    window.region.type, window.space_data.region_3d = "WINDOW", window.region_data
+    area = type("Area", (), {"regions": [window.region], "spaces": type("Spaces", (), {"active": window.space_data})})
+    foreseen, settings = chosen._shown_in(area, bpy.context.evaluated_depsgraph_get())
+    made = Engine()
+    window.update(made)
+    window.draw(made)
+    (kept,) = viewport._viewports.values()
+    shown = kept.frame.snapshot
+    assert foreseen.camera.clip_end == 77.0 and foreseen.camera.aperture == shown.camera.aperture is not None
+    assert [one.visibility for one in foreseen.instances] == [one.visibility for one in shown.instances]
+    assert settings.shows == kept.frame.settings.shows and foreseen.film.transparent == shown.film.transparent
 
 
 def test_pixel_size_of_blender_is_followed(window):

@@ -63,6 +63,27 @@ def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones
     np.testing.assert_array_equal(images.read(cold.viewport.picture), expected)
 
 
+def test_programs_that_a_driver_compiles_while_it_draws_come_in_over_many_redraws(cold, monkeypatch):
+    """As llvmpipe does for Vulkan, in a thread of its own: it takes no time of the caller, until that waits."""
+    finish, waited = images.finish, [library.first_uses]
+
+    def finish_late():
+        finish()
+        cold.clock.now += viewport.BUDGET_S * (library.first_uses - waited[0])
+        waited[:] = [library.first_uses]
+
+    monkeypatch.setattr(images, "finish", finish_late)
+    cold.clock.tick, most, began = 0.0, 0, library.first_uses
+    for _ in range(200):
+        used = library.first_uses
+        cold.draw()
+        most = max(most, library.first_uses - used)
+        if not cold.viewport.looks:
+            break
+    assert cold.viewport.frame.samples_done > 0
+    assert library.first_uses - began > 2 * most
+
+
 @pytest.mark.slow
 def test_edit_that_needs_new_programs_leaves_the_old_picture_until_they_are_there(cold):
     cold.clock.tick = 0.0

@@ -164,3 +164,12 @@ def test_light_is_kept_near_fresh_light_only_where_something_moves_before_a_lamp
     counts = images.read(frame.images["history.place"])[..., 3]
     assert frame.before.moved and counts.max() == pytest.approx(12.0)
     assert 0.05 < (counts[counts > 0] <= FEW + 1).mean() < 0.95
+
+
+def test_history_counts_by_how_much_of_a_place_shows_the_surface(drafts):
+    """Between the pixels of the picture before, of which some show another surface next to outlines."""
+    drafts()
+    counts = samples_behind(drafts(moved=0.01))
+    counts = counts[counts > 0]
+    assert np.median(counts) == pytest.approx(2.0)
+    assert 0.02 < ((counts > 1.05) & (counts < 1.95)).mean() < 0.3

@@ -14,6 +14,7 @@ from addon.snapshot.scene import Note
 from addon.ui import viewport_pass
 from addon.ui.properties import settings_of
 from tests.viewport.region import SIZE
+from tests.viewport.test_compiling import material_named
 
 
 def final_picture(scene, tmp_path, samples):
@@ -59,10 +60,21 @@ def test_view_matrices_give_the_picture_of_the_camera(scene, region):
     assert (difference <= 2).mean() >= 0.99
 
 
-def test_bands_change_no_pixel(region):
+@pytest.mark.parametrize("glass", [False, True])
+def test_bands_change_no_pixel(region, glass):
+    names = {"direct_light", "instant_radiosity"} | ({"traced_refraction"} if glass else set())
+    if glass:
+        material = material_named("Glass")
+        material.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
+        bpy.data.objects["Cube"].data.materials.append(material)
+
     class Thin(Bands):
+        def split(self, name, height):
+            names.discard(name)
+            return super().split(name, height)
+
         def learn(self, seconds, wanted):
-            self._rows = dict.fromkeys(("direct_light", "environment_light", "instant_radiosity"), 5)
+            self._rows = dict.fromkeys(("direct_light", "instant_radiosity", "traced_refraction"), 5)
 
     class Whole(Bands):
         def split(self, name, height):
@@ -73,6 +85,7 @@ def test_bands_change_no_pixel(region):
     region.viewport.bands = Thin()
     region.draw(region.moved(0.1))
     assert np.array_equal(region.rest(), whole)
+    assert not names
 
 
 def test_sample_that_was_left_unfinished_is_not_continued_from(scene, region):

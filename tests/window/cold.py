@@ -14,7 +14,7 @@ from stage import ENGINE, FOLDER, candela, picture, result, run, viewport_area, 
 
 SAMPLES = 2
 TIMEOUT_S = 400.0  # of one step
-UNTIL_LIGHT = "until_light"  # as an argument
+UNTIL_LIGHT, AFTER = "until_light", "after="  # as arguments
 PAUSE_S = 0.02  # between two looks; more of them would take processors from what is measured
 
 
@@ -115,7 +115,8 @@ def steps():
     scene.candela.viewport_samples = SAMPLES
     space.overlay.show_overlays = space.show_gizmo = False
     space.region_3d.view_perspective = "CAMERA"
-    yield 1.0
+    given = sys.argv[sys.argv.index("--") + 1 : -1]
+    yield next((float(one.removeprefix(AFTER)) for one in given if one.startswith(AFTER)), 1.0)
 
     def choose():
         space.shading.type = "RENDERED"
@@ -143,11 +144,9 @@ def steps():
         scene.render.border_min_x = scene.render.border_min_y = 0.25
         scene.render.border_max_x = scene.render.border_max_y = 0.75
 
-    asked = [one for one in sys.argv[sys.argv.index("--") + 1 : -1] if one != UNTIL_LIGHT]
-    wanted = asked or ["rendered", "lamp", "material", "border"]
     changes = {"rendered": choose, "lamp": add_lamp, "material": add_material, "border": border}
-    for name in wanted:
-        yield from until_rest(name, changes[name], UNTIL_LIGHT in sys.argv)
+    for name in [one for one in given if one in changes] or changes:
+        yield from until_rest(name, changes[name], UNTIL_LIGHT in given)
     result["folder"] = str(FOLDER)
 
 

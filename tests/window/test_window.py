@@ -101,6 +101,20 @@ def driven(request, installed):
 
 
 @pytest.fixture(scope="module", params=BACKENDS)
+def chosen(request, installed):
+    return run_script(request.param, "chosen")
+
+
+def test_what_a_view_needs_is_compiled_when_the_engine_is_chosen(chosen):
+    folder, result = chosen
+    assert result.get("error") is None
+    assert not complaints(folder)
+    assert result["foreseen"] == ["draft", "full"]
+    assert result["jobs"] == 1 and not result["held"]  # nothing was waited for
+    assert result["status"].startswith("Sample 2 of 2")
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
 def walked(request, installed):
     return run_script(request.param, "walk")
 

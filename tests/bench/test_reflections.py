@@ -1,0 +1,38 @@
+"""What carries an error, and the shapes that scenes of mirrors and glass are made of."""
+
+import bpy
+import numpy as np
+import pytest
+
+from bench import reflections, shapes
+from bench.shading import glass
+
+
+def _passes(**paths):
+    """Passes (8, 8, 3) of these values by path, whose colours are one; lobes that are not named are dark."""
+    made = {f"{lobe}_color": np.ones((8, 8, 3)) for lobe in ("diffuse", "glossy", "transmission")}
+    return made | {name: np.full((8, 8, 3), value) for name, value in paths.items()}
+
+
+def test_the_error_is_carried_by_the_path_that_differs():
+    truth = _passes(diffuse_direct=1.0, glossy_indirect=0.5, emission=0.0)
+    found = _passes(diffuse_direct=1.01, glossy_indirect=0.75, emission=0.0)
+    path, share, mean = reflections.carrier(found, truth)
+    assert (path, share, mean) == ("glossy indirect", pytest.approx(0.25 / 0.26), pytest.approx(1.5))
+
+
+def test_balls_and_turned_bodies_face_outwards_and_are_closed(registered):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    ball = shapes.ball(glass(), (1, 2, 3), 0.5, 12)
+    cone = shapes.lathe(glass(), [(0, 0), (0.4, 0), (0.2, 1), (0, 1)], segments=12)
+    for made in (ball, cone):
+        corners = np.array([one.co for one in made.data.vertices])
+        edges = {}
+        for face in made.data.polygons:
+            assert (corners[list(face.vertices)].mean(axis=0) - corners.mean(axis=0)) @ np.array(face.normal) > 0
+            for edge in face.edge_keys:
+                edges[edge] = edges.get(edge, 0) + 1
+        assert set(edges.values()) == {2}
+    assert np.allclose(np.linalg.norm([one.co for one in ball.data.vertices], axis=1), 0.5)
+    uv = np.array([one.vector for one in ball.data.uv_layers[0].uv])
+    assert (uv.min(), uv.max()) == (0.0, 1.0)
