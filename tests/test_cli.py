@@ -4,15 +4,18 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from addon.cli.files import refuse_others
 from addon.cli.refused import Refused
 from addon.cli.slices import read_header
 from addon.cli.terminal import quiet
 from addon.compare.exr_write import write_exr
+from addon.compare.report import MADE_BY
 from addon.snapshot.errors import unforeseen
 from addon.snapshot.exr import read_exr
 
@@ -323,6 +326,21 @@ def test_files_of_others_in_the_folder_of_an_output_stay(verb, names, tmp_path):
         (tmp_path / name).write_text("mine")
     assert_refused(candela(verb, CORNELL, "--output", tmp_path, folder=tmp_path), 1, names[0], "not replaced")
     assert {one.name: one.read_text() for one in tmp_path.iterdir() if one.is_file()} == dict.fromkeys(names, "mine")
+
+
+@pytest.mark.parametrize(
+    ("head", "is_ours"),
+    [
+        ('<meta name="generator" content="Candela">\n<title>A: Candela against Cycles</title>', True),
+        ("<title>Two &amp; more: Candela against Cycles</title>", True),  # as versions before that mark wrote it
+        ("<title>Notes on Candela against Cycles</title>", False),
+    ],
+)
+def test_a_page_of_an_earlier_version_is_replaced_and_one_that_only_speaks_of_it_stays(head, is_ours, tmp_path):
+    (tmp_path / "index.html").write_text(f'<!doctype html>\n<html lang="en">\n<head>\n{head}\n</head>\n')
+    (tmp_path / "cycles.png").write_bytes(b"")
+    with nullcontext() if is_ours else pytest.raises(Refused, match=r"index\.html .* not replaced"):
+        refuse_others(tmp_path, {"index.html": MADE_BY}, ("candela.png", "cycles.png"))
 
 
 def test_merge_opens_no_file_that_a_slice_names(tmp_path):

@@ -20,7 +20,8 @@ from .first_row import Shown
 from .metrics import EMPTY_DEPTH, PathError, display, figures, is_surface
 from .png import data_url, png
 
-MADE_BY = '<meta name="generator" content="Candela">'  # of page.html
+# What only pages of Candela have: the mark in page.html, and the title, as those of versions before the mark have it.
+MADE_BY = ('<meta name="generator" content="Candela">', ": Candela against Cycles</title>")
 LARGE_WIDTH = 1920  # pixels; wider pictures are averaged down by a whole factor
 SMALL_WIDTH = 640  # of all rows but the first
 GAINS = {"four": 4.0, "sixteen": 16.0}

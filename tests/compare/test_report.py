@@ -13,7 +13,7 @@ from addon.compare.first_row import Shown
 from addon.compare.metrics import compare_depth, compare_normal, compare_radiance
 from addon.compare.passes import ROWS, Row
 from addon.compare.png import png
-from addon.compare.report import ReportError, difference_palette, page, shrink, signed_difference, write_report
+from addon.compare.report import MADE_BY, ReportError, difference_palette, page, shrink, signed_difference, write_report
 
 
 def comparison(**more):
@@ -146,6 +146,10 @@ def test_pictures_of_any_shape_fit(size):
     x = np.ones((height, width, 3), np.float32)
     row = Picture(Row("Combined", "image", "combined"), x, x, compare_radiance("Combined", x, x))
     parsed(page(comparison(pictures=(row,), size=size)))
+
+
+def test_a_page_bears_each_mark_by_which_its_folder_is_known():
+    assert all(mark in page(comparison()) for mark in MADE_BY)
 
 
 def test_a_report_is_written_in_one_step(tmp_path):
