@@ -198,11 +198,17 @@ def _users(shader: str) -> list[str]:
     while waiting:
         name = waiting.pop(0)
         seen.add(name)
-        modules |= dict.fromkeys(stem for stem, text in _texts("addon", "*.py") if f'"{name}"' in text)
+        modules |= dict.fromkeys(stem for stem, text in _texts("addon", "*.py") if _names(text, name))
         for other, text in _texts("shaders", "*.glsl", whole=True):
             if f'#include "{name}"' in text and other not in seen:
                 waiting.append(other)
     return list(modules)
+
+
+def _names(text: str, shader: str) -> bool:
+    """Whether a module names this shader, by itself or as f"edges/{what}.frag.glsl"."""
+    made = (re.sub(r"\\\{.*?\\\}", r"\\w+", re.escape(name)) for name in re.findall(r'f"(\w+/[^"]*\.glsl)"', text))
+    return f'"{shader}"' in text or any(re.fullmatch(name, shader) for name in made)
 
 
 @cache

@@ -111,6 +111,11 @@ def test_what_is_a_choice_is_not_drawn(text, old, is_choice):
     assert drawn_mutations._is_a_choice(text, text.rindex(old), old) == is_choice
 
 
+def test_a_shader_whose_name_is_made_of_parts_is_judged_by_the_tests_of_what_draws_it():
+    """f"edges/{what}.frag.glsl" of edge_tiles.py: pictures of depth complexity, and not only how its data is kept."""
+    assert "tests/techniques/test_depth_complexity.py" in drawn_mutations.tests_for("shaders/edges/quads.frag.glsl")[:2]
+
+
 def test_a_draw_stays_what_it_is_where_files_are_added(monkeypatch, tmp_path):
     """Those that were drawn are found by their line, wherever it stands now; others take the places of lines that are
     gone, and none is drawn twice."""

@@ -1,10 +1,13 @@
 """Points of the film in all pixels whose filter covers them: the filtered picture, with less noise, up to the rim."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
 from addon.film import filter as film_filter
+from addon.gfx import images, passes
 from addon.scene.view import blackman_harris, blackman_harris_offset
 
 SPAN = 4.0
@@ -29,6 +32,54 @@ def test_weights_of_a_point_sum_to_one_and_make_the_filter(width):
 
 def test_pixels_share_points_where_their_filters_overlap():
     assert [film_filter.reach(width) for width in (0.01, 0.5, 0.51, 1.5, 1.51, 2.5, 2.6)] == [0, 0, 1, 1, 2, 2, 0]
+
+
+@pytest.mark.parametrize("width", [0.4, 1.0, 1.5, 2.0, 2.5])
+@pytest.mark.parametrize("place", [(0.3, -0.2), (-0.45, 0.9), (-1.2, 1.4)], ids=str)
+def test_one_point_goes_to_each_pixel_as_by_numpy(gpu_context, width, place):
+    """Of an image whose pixels all differ: weights of `taps`, and the own point alone within twice the reach of a rim,
+    along the axis that leads there."""
+    place = tuple(np.clip(place, -width, width))
+    seen = np.random.default_rng(3).random((9, 13, 4)).astype(np.float32)
+    frame = SimpleNamespace(snapshot=SimpleNamespace(film=SimpleNamespace(filter_width=width)))
+    constants = film_filter.place_constants(frame, place, 0.25)
+    pixels = film_filter.reach(width)
+    with images.borrowed(13, 9, "RGBA32F") as target:
+        passes.each_pixel(
+            film_filter.program(1, pixels), target, textures={"seen_0": images.upload(seen)}, constants=constants
+        )
+        found = images.read(target.colors[0])
+
+    def along(count, at):  # (count, count): what each pixel takes of each point
+        own, weights = film_filter.taps(at, width)
+        takes = np.eye(count)
+        for k in range(2 * pixels, count - 2 * pixels):
+            takes[k] = 0.0
+            takes[k, k - pixels - own : k + pixels - own + 1] = weights
+        return takes
+
+    across, up = (along(count, at) for count, at in zip((13, 9), place))
+    np.testing.assert_allclose(found, 0.25 * np.einsum("yj,xi,jic->yxc", up, across, seen), rtol=2e-5, atol=1e-6)
+
+
+def test_media_dim_a_point_and_count_as_cover_of_the_world(gpu_context):
+    """Colours times what is let through; alpha, of the image that holds the world, as of a layer over it."""
+    seen, through = np.random.default_rng(4).random((2, 3, 5, 4)).astype(np.float32)
+    frame = SimpleNamespace(snapshot=SimpleNamespace(film=SimpleNamespace(filter_width=0.4)))
+    kinds = (film_filter.CLEAR, film_filter.DIMMED, film_filter.COVERED)
+    drawn = [images.create(5, 3, "RGBA32F") for _ in kinds]
+    passes.each_pixel(
+        film_filter.program(3, 0, kinds), images.Target(tuple(drawn)),
+        textures={f"seen_{k}": images.upload(seen) for k in range(3)} | {"through": images.upload(through)},
+        constants=film_filter.place_constants(frame, (0.0, 0.0), 1.0),
+    )  # fmt: skip
+    clear, dimmed, covered = map(images.read, drawn)
+    passing = np.concatenate([through[..., :3], np.ones((3, 5, 1))], axis=2)
+    np.testing.assert_allclose(clear, seen, rtol=1e-6)
+    np.testing.assert_allclose(dimmed, seen * passing, rtol=1e-5)
+    np.testing.assert_allclose(covered[..., :3], dimmed[..., :3], rtol=1e-5)
+    hidden = 1 - through[..., :3].mean(axis=2)
+    np.testing.assert_allclose(covered[..., 3], seen[..., 3] + hidden * (1 - seen[..., 3]), rtol=1e-5)
 
 
 def edge(stage, width):

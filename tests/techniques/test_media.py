@@ -9,6 +9,7 @@ from addon.lighting.media import MediaService
 from addon.materials.volume import PHASES, Medium
 from addon.scene.media import BOX, CORNERS, Filled, box_rows, phase_values
 from addon.snapshot.volumes import openvdb
+from addon.techniques.airlight import SPREAD
 from addon.ui.properties import settings_of
 from tests.techniques.foggy_stage import absorber, box, fill, fog, glowing_floor, volume
 from tests.techniques.test_image_space_subsurface import sphere
@@ -307,6 +308,40 @@ def of_corners(seen):
 
 
 @pytest.mark.slow
+def test_light_of_media_is_spread_by_its_guide_and_stays_where_that_met_nothing(stage):
+    """Behind a slab of even opacity: light over opacity of the pixel that is known, times what the guide has here over
+    what it has there, but at most eight times as much, in the channels where it has met anything."""
+    stage.camera_above()
+    glowing_floor(stage)
+    box(stage, absorber(stage, (0.7, 0.7, 0.7)), (-3, -3, -0.5), (3, 3, 0.5))
+    stage.render(size=(8, 8))
+    frame, opacity, known_opacity = stage.renderer.frame, 1 - np.exp(-0.7), 0.8
+    limit = stage.scene.camera.location.z + 2.0 - stage.scene.camera.data.clip_start
+    light, fire = np.array([3.0, 0.5, 2.0]), np.array([0.2, 0.4, 0.6])
+    there, here = np.array([2.0, 1.0, 0.0]), np.array([3.0, 100.0, 0.0])
+    guide = np.zeros((8, 8, 4), np.float32)
+    guide[..., :3] = here
+    guide[::2, ::2, :3] = there  # at the pixels that are known
+    known = [np.full((4, 4, 4), (*of_it, last)) for of_it, last in ((light, limit), (fire, known_opacity))]
+    drawn = [images.create(8, 8, "RGBA32F") for _ in SPREAD.outputs]
+    passes.fullscreen(
+        SPREAD, images.Target(tuple(drawn)),
+        textures={
+            "surface_position": frame.images["surface.position"], "airlight_guide": images.upload(guide),
+            "coarse_direct": images.upload(known[0]), "coarse_emission": images.upload(known[1]),
+            **frame.service(MediaService).media.attenuation(),
+        },
+        blocks={"film_view": frame.view_block}, constants={"shown_pixel": (0, 0), "stride": 2},
+    )  # fmt: skip
+    direct, emission = map(images.read, drawn)
+    share = opacity / known_opacity
+    for at in ((4, 5), (5, 4), (3, 3)):
+        expected = np.where(there > 0, light * here / np.maximum(there, 1e-9), light * share)
+        assert direct[at][:3] == pytest.approx(np.minimum(expected, 8 * light * share), rel=1e-3), at
+        assert emission[at][:3] == pytest.approx(fire * share, rel=1e-3)
+    assert direct[4, 4, :3] == pytest.approx(np.where(there > 0, light, light * share), rel=1e-3)
+
+
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
 def test_airlight_is_the_same_at_any_size(stage, scale):
     lit_cube(stage, scale)
