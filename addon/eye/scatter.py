@@ -23,11 +23,15 @@ Billboards add the kernel once for each tile of 16 x 16 pixels that holds bright
 fast for few small sources, wrong in shape within a tile for extended ones (needles stay needles where the convolution
 washes them out); energy is kept.
 
+A picture of few samples holds pixels that one lucky path made bright. `plausible` is the picture without them, in one
+pass of 25 x 4 fetches; given as `dazzling`, it alone scatters, and what is left out stays in its pixel.
+
 Source: Ritschel et al. 2009, which convolves the whole picture with the whole kernel; the split is ours.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -38,6 +42,10 @@ from .point_spread import Kernel, unit_square
 
 FACTORS = (1, 2, 4)
 TILE = 16
+# Most contrast of indirect light in a pixel to the fourth brightest of 5x5 in a picture of one sample; of n samples n²
+# times as much: a path found once counts an n-th there, and by chance less often. From UNLIMITED on none is left out.
+CONTRAST = 4.0
+UNLIMITED = 16
 MOST_LIGHT = 1e6  # of the picture's unit; what is brighter counts as that, so that infinity scatters something finite
 _WHITE = (("FLOAT", "white"), ("FLOAT", "most_light"))
 BRIGHT = tuple(
@@ -55,12 +63,19 @@ COMBINE = tuple(
     passes.fullscreen_program(
         f"glare: sum, {factor}",
         "glare/combine.frag.glsl",
-        textures=(("RGBA32F", "picture"), ("RGBA32F", "scattered"), ("RGBA32F", "share")),
+        textures=(("RGBA32F", "picture"), ("RGBA32F", "dazzling"), ("RGBA32F", "scattered"), ("RGBA32F", "share")),
         constants=(*_WHITE, ("FLOAT", "strength"), ("FLOAT", "dimming")),
         defines=(("FACTOR", str(factor)),),
         outputs=(("VEC4", "out_combined"),),
     )
     for factor in FACTORS
+)
+PLAUSIBLE = passes.fullscreen_program(
+    "glare: plausible light",
+    "glare/plausible.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in ("picture", "emission", "environment", "reflected")),
+    constants=(("FLOAT", "white"), ("FLOAT", "scale"), ("FLOAT", "world"), ("FLOAT", "most_contrast")),
+    outputs=(("VEC4", "out_plausible"),),
 )
 WRAP = passes.fullscreen_program(
     "glare: kernel about the corner",
@@ -133,6 +148,21 @@ def measure(picture: images.Image, white: float) -> Brightness:
     return Brightness(float(mean) / (picture.width * picture.height), float(excess), float(most))
 
 
+def plausible(
+    picture: images.Image, straight: Mapping[str, images.Image], target: images.Target, *,
+    scale: float, world: float, white: float, samples: int,
+) -> int:  # fmt: skip
+    """The picture, where light by way of other surfaces counts for no more than its surroundings and the number of
+    samples hold plausible. Returns the number of passes.
+
+    `straight`: sums over samples of what is seen straight, *emission*, *environment* and *reflected* (lamps in one
+    reflection); `scale` times these is the picture's; `world`: 1 where the picture shows the environment, else 0.
+    """
+    constants = {"white": white, "scale": scale, "world": world, "most_contrast": CONTRAST * samples**2}
+    passes.fullscreen(PLAUSIBLE, target, textures={"picture": picture, **straight}, constants=constants)
+    return 1
+
+
 def colour(picture: images.Image, white: float) -> tuple[float, float, float]:
     """Sum of what exceeds white, linear Rec. 709. Waits for the GPU, and copies one texel."""
     with images.borrowed(1, 1, "RGBA32F") as target:
@@ -152,7 +182,7 @@ def dim(picture: images.Image, target: images.Target, dimming: float) -> int:
         nothing.clear()
         passes.fullscreen(
             COMBINE[0], target,
-            textures={"picture": picture, "scattered": picture, "share": nothing.colors[0]},
+            textures={"picture": picture, "dazzling": picture, "scattered": picture, "share": nothing.colors[0]},
             constants={"strength": 0.0, "dimming": dimming, "white": MOST_LIGHT, "most_light": MOST_LIGHT},
         )  # fmt: skip
     return 1
@@ -167,12 +197,14 @@ class Scatter:
 
     def convolve(
         self, picture: images.Image, kernel: Kernel, target: images.Target, *, white: float, strength: float,
-        dimming: float = 1.0, factor: int = 1,
+        dimming: float = 1.0, factor: int = 1, dazzling: images.Image | None = None,
     ) -> int:  # fmt: skip
         """The picture with its glare into `target`; the kernel is of pixels `factor` times as large as the picture's.
+        `dazzling`: the picture as far as it scatters, where that is not all.
 
         Returns the number of passes.
         """
+        dazzling = dazzling or picture
         size = tuple(-(-side // factor) for side in picture.size)
         padded = tuple(fft.fitting_side(side + kernel.scale.reach) for side in size)
         number = FACTORS.index(factor)
@@ -180,12 +212,12 @@ class Scatter:
         with images.borrowed(*padded, "RGBA32F") as bright, images.borrowed(*padded, "RGBA32F") as spare:
             transformed = self._transform_of(kernel, padded)
             passes.fullscreen(
-                BRIGHT[number], bright, viewport=(0, 0, *size), textures={"picture": picture}, constants=limits
+                BRIGHT[number], bright, viewport=(0, 0, *size), textures={"picture": dazzling}, constants=limits
             )
             found, other = fft.transform(bright, spare, extent=size)
             fft.multiply(found.colors[0], transformed.colors[0], other)
             found, _ = fft.transform(other, found, inverse=True, extent=size)
-            self._combine(number, picture, found.colors[0], kernel, target, strength, dimming, limits)
+            self._combine(number, picture, dazzling, found.colors[0], kernel, target, strength, dimming, limits)
         return 3 + 2 * fft.pass_count(*padded)
 
     def _transform_of(self, kernel: Kernel, padded: tuple[int, int]) -> images.Target:
@@ -204,15 +236,16 @@ class Scatter:
 
     def billboards(
         self, picture: images.Image, kernel: Kernel, target: images.Target, *, white: float, strength: float,
-        dimming: float = 1.0,
+        dimming: float = 1.0, dazzling: images.Image | None = None,
     ) -> int:  # fmt: skip
         """The same by a kernel for each tile that holds bright light."""
+        dazzling = dazzling or picture
         tiles = tuple(-(-side // TILE) for side in picture.size)
         limits = {"white": white, "most_light": MOST_LIGHT}
         with ExitStack() as stack:
             light, place = (stack.enter_context(images.borrowed(*tiles, "RGBA32F")).colors[0] for _ in range(2))
             added = stack.enter_context(images.borrowed(*picture.size, "RGBA32F"))
-            passes.fullscreen(TILES, images.Target((light, place)), textures={"picture": picture}, constants=limits)
+            passes.fullscreen(TILES, images.Target((light, place)), textures={"picture": dazzling}, constants=limits)
             added.clear()
             shader = library.get(BILLBOARDS)
             with passes.drawing(added, blend="ADDITIVE_PREMULT", depth_test="NONE", depth_write=False):
@@ -221,13 +254,13 @@ class Scatter:
                     constants={"reach": kernel.scale.reach, "extent": picture.size},
                 )
                 passes.draw(shader, unit_square(), tiles[0] * tiles[1])
-            self._combine(0, picture, added.colors[0], kernel, target, strength, dimming, limits)
+            self._combine(0, picture, dazzling, added.colors[0], kernel, target, strength, dimming, limits)
         return 3
 
-    def _combine(self, number, picture, scattered, kernel: Kernel, target, strength, dimming, limits) -> None:
+    def _combine(self, number, picture, dazzling, scattered, kernel: Kernel, target, strength, dimming, limits) -> None:
         passes.fullscreen(
             COMBINE[number], target,
-            textures={"picture": picture, "scattered": scattered, "share": kernel.share},
+            textures={"picture": picture, "dazzling": dazzling, "scattered": scattered, "share": kernel.share},
             constants={"strength": strength, "dimming": dimming, **limits},
         )  # fmt: skip
 

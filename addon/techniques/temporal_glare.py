@@ -13,11 +13,15 @@ then the same to the bit; what was done is one reduction and one texel read back
 
 | 1024 x 1024, pattern 512, convolved at full size | passes | fetches per pixel |
 |---|---|---|
+| of fewer than 16 samples: what of it is plausible | 1 | 25 x 4 |
 | measure; its colour where Spectrum is *By Colour* | 4 each | 1 |
 | point spread, when the time or the eye changes | 16 to 18 | (addon/eye/point_spread.py) |
 | scatter | 20 | 2.25 x (1 + 27 + 4 + 27) + 2 |
 
 Bytes: 48 per padded texel (1536 x 1536 for 1024 x 1024) borrowed.
+
+Of fewer than 16 samples an isolated pixel of indirect light dazzles by no more than its surroundings and the number of
+samples hold plausible (`scatter.plausible`): one lucky path is no star. The rest of its light stays where it is.
 
 Bias: light below white is not scattered (its veil is missing), what lies beyond the picture's borders casts no glare
 into it, the kernel is the same all over the picture. Fails for pictures whose light was clipped before.
@@ -41,12 +45,16 @@ from ..film.resolve import COMBINED
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import CAMERA, Param, Technique, Write
-from ..gfx import passes
+from ..gfx import images, passes
 from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Camera, Snapshot
 from .eye import BILLBOARDS, GLARE, MODE, OFF, PointSpread
 
 LENS = "film.lens"
+# Sums over samples of what is seen straight: a lamp there is no matter of chance (shaders/glare/plausible.frag.glsl).
+STRAIGHT = {
+    "emission": "radiance.emission", "environment": "radiance.environment", "reflected": "radiance.glossy_direct",
+}  # fmt: skip
 RESOLUTIONS = (
     ("FULL", "Full", 1, "Every pixel of the picture"),
     ("HALF", "Half", 2, "Pixels of twice the side: about a quarter of the time"),
@@ -102,7 +110,12 @@ class TemporalGlare(Technique):
         return bends_lines(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple:
-        return scatter.MEASURE, scatter.BLOCKS  # what else there is may never be needed
+        few = (scatter.PLAUSIBLE,) if self.looks_at(settings) else ()
+        return scatter.MEASURE, scatter.BLOCKS, *few  # what else there is may never be needed
+
+    def looks_at(self, settings: Settings) -> tuple[str, ...]:
+        few = settings.samples < scatter.UNLIMITED or settings.schedule.shows_each
+        return tuple(STRAIGHT.values()) if few else ()
 
     def show(self, frame: Frame) -> None:
         now = (frame.samples_done, frame.plan.shown_with(frame.snapshot, frame.settings))
@@ -123,13 +136,30 @@ class TemporalGlare(Technique):
         if service is None:  # a pass tree without an eye
             return self._unseen(frame, "no eye brings a point spread: add the pass Eye to the tree")
         picture = frame.images[COMBINED]
+        apart = all(frame.held.is_apart(name) for name in STRAIGHT.values())  # not where many samples end early
+        if not apart or frame.samples_done >= scatter.UNLIMITED:
+            return self._dazzled(frame, service, picture)
+        with images.borrowed(*picture.size, "RGBA32F") as plausible:
+            film = frame.snapshot.film
+            straight = {kind: frame.held.to_show(name) for kind, name in STRAIGHT.items()}
+            done = scatter.plausible(
+                picture, straight, plausible, white=frame.settings.get(self, "white"),
+                scale=film.exposure / (frame.samples_done + frame.part_done or 1.0),
+                world=float(not film.transparent), samples=max(frame.samples_done, 1),
+            )  # fmt: skip
+            frame.count(self, "passes", done)
+            return self._dazzled(frame, service, plausible.colors[0])
+
+    def _dazzled(self, frame: Frame, service: PointSpread, dazzling: images.Image) -> str | None:
+        """The same, of a picture of which no more scatters than `dazzling` holds."""
+        picture = frame.images[COMBINED]
         white, strength, magnification, luminance, sharp = (
             frame.settings.get(self, name) for name in ("white", "strength", "magnification", "luminance", "sharp")
         )
         factor = {name: number for name, _, number, _ in RESOLUTIONS}[frame.settings.get(self, "resolution")]
         billboards = frame.settings.get(self, "mode") == BILLBOARDS
         factor = 1 if billboards else factor
-        measured = scatter.measure(picture, white)
+        measured = scatter.measure(dazzling, white)
         frame.count(self, "passes", scatter.measure_passes(picture))
         aperture = service.aperture(frame, luminance * measured.mean)
 
@@ -148,10 +178,10 @@ class TemporalGlare(Technique):
         else:
             colour = WHITE
             if service.needs_colour(frame):
-                colour = scatter.colour(picture, white)
+                colour = scatter.colour(dazzling, white)
                 frame.count(self, "passes", scatter.measure_passes(picture))
             kernel = service.kernel(frame, aperture, scale, sharp, colour)
-            how = {"white": white, "strength": strength, "dimming": aperture.light}
+            how = {"white": white, "strength": strength, "dimming": aperture.light, "dazzling": dazzling}
             if billboards:
                 done = self._scatter.billboards(picture, kernel, target, **how)
             else:

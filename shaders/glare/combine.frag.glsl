@@ -1,4 +1,4 @@
-// The picture, what exceeds white lessened by its scattered share, and what scatters to here from elsewhere.
+// The picture, what dazzles lessened by its scattered share, and what scatters to here from elsewhere.
 #include "glare/excess.glsl"
 
 vec3 scattered_at(vec2 pixel)
@@ -26,7 +26,7 @@ void main()
   vec3 sum = share_fetch(ivec2(0)).rgb;
   vec3 lost = min(strength * sum, vec3(1.0));
   vec3 factor = lost / max(sum, vec3(1e-30));
-  vec3 light = finite_light(seen.rgb) - lost * excess_of(seen.rgb, white, most_light);
+  vec3 light = finite_light(seen.rgb) - lost * excess_of(dazzling_fetch(pixel).rgb, white, most_light);
   light += factor * max(scattered_at(gl_FragCoord.xy), vec3(0.0));
   out_combined = vec4(dimming * max(light, vec3(0.0)), is_finite(seen.a) ? seen.a : 1.0);
 }

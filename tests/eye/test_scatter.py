@@ -30,13 +30,16 @@ class Glare:
         self.factor = factor
         self.scatter = self.module.Scatter()
 
-    def __call__(self, picture, mode="convolve", white=WHITE, strength=1.0, dimming=1.0):
+    def __call__(self, picture, mode="convolve", white=WHITE, strength=1.0, dimming=1.0, dazzling=None):
         alpha = np.ones((*picture.shape[:2], 1))
-        image = images.upload(np.concatenate([picture, alpha], axis=2).astype(np.float32))
+        image, scattering = (
+            None if light is None else images.upload(np.concatenate([light, alpha], axis=2).astype(np.float32))
+            for light in (picture, dazzling)
+        )
         target = images.Target((images.create(*image.size, "RGBA32F"),))
         options = {"factor": self.factor} if mode == "convolve" else {}
         getattr(self.scatter, mode)(
-            image, self.kernel, target, white=white, strength=strength, dimming=dimming, **options
+            image, self.kernel, target, white=white, strength=strength, dimming=dimming, dazzling=scattering, **options
         )
         found = images.read(target.colors[0])
         assert np.isfinite(found).all() and (found >= 0).all()
@@ -122,6 +125,49 @@ def test_an_even_picture_stays_itself_away_from_the_borders(whole_glare):
     picture = np.full((2 * reach + 20, 2 * reach + 31, 3), (3.0, 2.0, 1.5))
     found = whole_glare(picture, white=0.0)[reach:-reach, reach:-reach]
     np.testing.assert_allclose(found, picture[reach:-reach, reach:-reach], rtol=1e-4)
+
+
+def plausible(module, picture, samples=1, **straight):
+    """What of a picture may dazzle; `straight`: of what is seen straight, mean of the samples."""
+    height, width = picture.shape[:2]
+    upload = lambda light: images.upload(np.dstack([light, np.ones((height, width))]).astype(np.float32))  # noqa: E731
+    of_kinds = {
+        kind: upload(samples * straight.get(kind, 0 * picture)) for kind in ("emission", "environment", "reflected")
+    }
+    target = images.Target((images.create(width, height, "RGBA32F"),))
+    how = {"scale": 1.0 / samples, "world": 1.0, "white": WHITE, "samples": samples}
+    module.plausible(upload(picture), of_kinds, target, **how)
+    return images.read(target.colors[0])[..., :3].astype(np.float64)
+
+
+@pytest.mark.parametrize("mode", ["convolve", "billboards"])
+def test_a_firefly_of_one_sample_is_no_star_and_a_lamp_is_one(eye_gpu, glare, mode):
+    """Of bounced light, also where the pixel filter shares the sample out among four pixels; its light stays where it
+    is. A lamp of one pixel, seen straight or in a mirror, keeps its star."""
+    random = np.random.default_rng(5)
+    around, lamps = 0.05 + 0.15 * random.random((61, 97, 3)), dark()
+    lamps[40, 70] = (300.0, 200.0, 100.0)
+    flies = dark()
+    flies[20, 20], flies[30, 40], flies[30:32, 50:52], flies[0, 96] = 56.0, (5.0, 28.0, 1.0), 14.0, 56.0
+    for kind in ("emission", "environment", "reflected"):
+        dazzling = plausible(eye_gpu[1], around + lamps + flies, **{kind: lamps})
+        assert np.abs(dazzling - around - lamps).max() < 2.0
+        expected = glare(around + lamps, mode) + flies
+        found = glare(around + lamps + flies, mode, dazzling=dazzling)
+        other = glare(around + lamps + flies, mode)
+        star = np.abs(other - expected).sum()
+        assert np.abs(found - expected).sum() < 0.02 * star
+        assert found.sum() == pytest.approx((around + lamps + flies).sum(), rel=0.02)  # but for what leaves the picture
+
+
+def test_light_that_surroundings_or_samples_hold_plausible_dazzles_whole(eye_gpu):
+    """A lamp's image of 3 x 3 pixels behind glass, the middle of any; with more samples what stands out still more."""
+    picture = np.full((61, 97, 3), 0.2)
+    picture[20:23, 30:33] = 80.0
+    np.testing.assert_allclose(plausible(eye_gpu[1], picture), picture, rtol=1e-6)
+    picture[40, 50] = 40.0
+    left = [plausible(eye_gpu[1], picture, samples)[40, 50, 0] for samples in (1, 2, 4, 8)]
+    assert left == pytest.approx([1.0, 3.2, 12.8, 40.0])  # white, 16 and 64 times its surroundings, all
 
 
 @pytest.mark.parametrize("mode", ["convolve", "billboards"])

@@ -130,6 +130,27 @@ def test_the_same_frame_is_the_same_alone_and_in_sequence(night):
     np.testing.assert_array_equal(night.render(size=SIZE)["glare"], alone)
 
 
+@pytest.mark.parametrize("samples", [1, 16])
+def test_an_isolated_pixel_of_bounced_light_is_a_star_of_many_samples_only(night, samples):
+    """A picture of one sample with such a pixel has the glare that it has without; the lamps' own does not change."""
+    night.render(samples, size=SIZE)
+    frame, technique = night.renderer.frame, next(t for t in night.renderer.techniques if t.name == "glare")
+    own = gpu_images.read(frame.images["film.combined"]).copy()
+    lens = []
+    for firefly in (0.0, 56.0):
+        pixels = own.copy()
+        pixels[10, 60, :3] += firefly
+        frame.images["film.combined"] = gpu_images.upload(pixels)
+        assert technique._show(frame) is None
+        lens.append(gpu_images.read(frame.images["film.lens"])[..., :3] - pixels[..., :3])
+    star = np.abs(lens[1] - lens[0]).sum()
+    assert own[..., :3].max() > 100.0
+    if samples == 1:
+        assert star < 0.01 * np.abs(lens[0]).sum()
+    else:
+        assert star > 5.0  # of 56: what an eye scatters, here and there
+
+
 def test_another_time_draws_no_sample_anew(night):
     night.render(size=SIZE)
     night.scene.frame_set(31)
