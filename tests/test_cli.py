@@ -14,7 +14,7 @@ from addon.cli.files import refuse_others
 from addon.cli.refused import Refused
 from addon.cli.slices import read_header
 from addon.cli.terminal import quiet
-from addon.compare.exr_write import write_exr
+from addon.compare.exr_write import read_about, write_exr
 from addon.compare.report import MADE_BY
 from addon.snapshot.errors import unforeseen
 from addon.snapshot.exr import read_exr
@@ -361,7 +361,8 @@ HEADER = {
     "about",
     [
         [], 1, None, {}, {**HEADER, "options": None}, {**HEADER, "options": {}}, {**HEADER, "file": "a\0b"},
-        {**HEADER, "layers": "A"}, {**HEADER, "total": "2"}, {**HEADER, "frame": 1 << 40},
+        {**HEADER, "layers": "A"}, {**HEADER, "total": "2"}, {**HEADER, "frame": 1 << 40}, {**HEADER, "layers": []},
+        {**HEADER, "layers": ["\ud800"]}, {**HEADER, "options": {**HEADER["options"], "view_layer": "\udcff"}},
     ],
 )  # fmt: skip
 def test_a_header_that_is_none_is_refused_in_a_sentence(tmp_path, about):
@@ -419,6 +420,17 @@ def test_slices_of_motion_blur_are_written_and_merged(moving, tmp_path):
         assert progress_of(done) == [50.0, 100.0]
     merged = candela("merge", "1.exr", "2.exr", "--file", moving, "--output", "whole.png", folder=tmp_path)
     assert merged.returncode == 0 and (tmp_path / "whole.png").exists(), merged.stderr
+
+
+def test_slices_of_a_view_layer_that_is_not_there_are_refused(tmp_path):
+    """Merged to nothing, with the scene's own layers rendered instead."""
+    options = ("--size", "8x6", "--samples", "2", "--slice", "1/2", "--output", "part.exr")
+    assert candela("render", CORNELL, *options, folder=tmp_path).returncode == 0
+    about = json.loads(read_about(tmp_path / "part.exr")["candela"]) | {"layers": ["Other"]}
+    write_exr(tmp_path / "part.exr", read_exr(tmp_path / "part.exr"), {"candela": json.dumps(about)})
+    done = candela("merge", "part.exr", "--file", CORNELL, "--output", "whole.png", folder=tmp_path)
+    assert_refused(done, 1, "no view layer Other")
+    assert not (tmp_path / "whole.png").exists()
 
 
 @pytest.mark.slow

@@ -56,6 +56,9 @@ def _merge(options: argparse.Namespace, paths: list[Path], output: Path) -> None
     )  # fmt: skip
     if (scene_hash(job.scene), slices.settings_hash(job.scene)) != (about["scene_hash"], about.get("settings_hash")):
         raise Refused(f"{job.options.file} is not the file of which these are slices: it has been changed since.")
+    unknown = [name for name in about["layers"] if name not in job.scene.view_layers]
+    if unknown:  # the scene's own layers would be rendered, and nothing merged
+        raise Refused(f"{job.options.file} has no view layer {', '.join(unknown)}, of which these are slices.")
     read = [slices.read_sums(part) for part in parts]
     try:
         engine.given.update({layer: merged([found[layer] for found in read]) for layer in about["layers"]})

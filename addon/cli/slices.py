@@ -40,8 +40,13 @@ def _is_number(value: object) -> bool:
     return type(value) is int and abs(value) < 1 << 31
 
 
-def _is_name(value: object) -> bool:
+def _is_path(value: object) -> bool:
     return isinstance(value, str) and "\0" not in value
+
+
+def _is_name(value: object) -> bool:
+    """Surrogates stand for bytes of a path that are no UTF-8, which names in Blender do not have."""
+    return _is_path(value) and not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 
 def _are_names(value: object) -> bool:
@@ -54,9 +59,10 @@ def _is_size(value: object) -> bool:
 
 # Of what kind each entry of a header is, and of its `options`.
 HEADER = {
-    **dict.fromkeys(("file", "scene_hash", "settings_hash", "blender"), _is_name),
+    "file": _is_path,
+    **dict.fromkeys(("scene_hash", "settings_hash", "blender"), _is_name),
     **dict.fromkeys(("frame", "total", "first", "count"), _is_number),
-    "layers": _are_names,
+    "layers": lambda value: _are_names(value) and value != [],
     "options": lambda value: isinstance(value, dict),
 }
 OPTIONS = {

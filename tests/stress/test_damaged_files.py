@@ -1,6 +1,6 @@
 """Files that are damaged at random: each is read or refused in a sentence, within bounds of memory and time.
 
-CANDELA_FUZZ=2000 tries that many of each kind.
+CANDELA_FUZZ=2000 tries that many of each kind; CANDELA_FUZZ_SEED=N others than usual.
 """
 
 import json
@@ -23,7 +23,7 @@ from addon.snapshot.exr import ExrError, read_exr
 from addon.snapshot.scene import one_line
 from addon.snapshot.volumes import openvdb
 
-COUNT = int(os.environ.get("CANDELA_FUZZ", "100"))
+COUNT, SEED = int(os.environ.get("CANDELA_FUZZ", "100")), int(os.environ.get("CANDELA_FUZZ_SEED", "17"))
 MOST_BYTES, MOST_SECONDS = 200 << 20, 2.0  # for one file of some kilobytes
 PROFILE = """IESNA:LM-63-2002
 TILT=NONE
@@ -43,7 +43,7 @@ HEADER = {
 
 def damaged(data: bytes, count: int):
     """The data cut, with bytes of chance, with runs of one byte, with extreme numbers, or with parts twice."""
-    chance = np.random.default_rng(17)
+    chance = np.random.default_rng(SEED)
     extremes = [struct.pack("<i", value) for value in (-1, 0, 2**31 - 1, -(2**31), 65536)] + [b"1e999", b"nan", b"-1 "]
     for _ in range(count):
         made = bytearray(data)
