@@ -10,10 +10,10 @@ pixels on the same side and faces the viewer, by the mean over those (subsurface
 | cost | per sample |
 |---|---|
 | rays | a pixel: `walks` times about 2 / (1 - albedo)^(1/2) + 2, none longer than 12 free paths |
-| walks | a pixel: 8 over the samples, at least 1; up to 8 where it is wider than half a free path |
+| walks | a pixel: 8 over the samples, at least 1; up to 16 where it is wider than an eighth of a free path |
 | bytes per pixel | 48 while it runs |
 
-Bias: light where walks leave is even within a point's cell; after 64 steps the rest leaves by diffusion.
+Bias: light where walks leave is even within a point's cell; after 256 steps the rest leaves by diffusion.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from ..scene.scatter_points import RANGE, ScatterPoints
 from ..scene.view import VIEW
 from ..surfaces.hits import Hits
 
-FEW_WALKS = 8  # of a pixel, in a picture of one sample, and of small pictures in each
+FEW_WALKS = 8  # of a pixel, in a picture of one sample
+MOST_WALKS = 16  # of a pixel in a sample, in small pictures
 NAMES = ("direct", "indirect", "near")
 PICTURE = ("surface_position", "surface_normal", "spread_length", "scatter_share", "spread_entry", "scatter_walk")
 WALK = passes.fullscreen_program(
@@ -69,7 +70,7 @@ def walks_of(frame: Frame) -> dict[str, int]:
     """Of a pixel in a sample, at least and at most: small pictures have more (subsurface/walked.glsl)."""
     if frame.settings.schedule.is_draft:
         return {"walks": 1, "most_walks": 1}
-    return {"walks": max(FEW_WALKS // frame.settings.samples, 1), "most_walks": FEW_WALKS}
+    return {"walks": max(FEW_WALKS // frame.settings.samples, 1), "most_walks": MOST_WALKS}
 
 
 def walk(

@@ -1,6 +1,6 @@
 // The mean of what walks bring over places of the object around, per channel within half a free path and a fraction of the
 // pixels' window: light from beyond the window changes over no less; of many walks less is asked, by the fourth root of
-// their number, so that what it blurs goes with them (lighting/walked_light.py). Pixels come in pairs, one on either side, so that
+// their number, so that what it blurs goes with them (lighting/walked_light.py), and of one sample all, whose outlines are hard. Pixels come in pairs, one on either side, so that
 // light which rises or falls evenly stays as it is, mostly so at edges.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
@@ -47,7 +47,8 @@ void main()
   float pixel_size = pixel_width_at(position);
   float range = window_of_walks(object_texel(first_object + OBJECT_TEXELS * (int(object) - 1)), pixel_size);
   vec3 free_path = max(spread_length_fetch(pixel).xyz, vec3(LEAST_SCALE));
-  float narrowness = pow(max(float(samples * walks_of_pixel(walks, most_walks, pixel_size, free_path)) / float(FEW_WALKS), 1.0), -0.25);
+  float many = float(samples * walks_of_pixel(walks, most_walks, pixel_size, free_path)) / float(FEW_WALKS);
+  float narrowness = pow(clamp(many, 1.0, float(samples * samples)), -0.25);
   vec3 wide = max(narrowness * min(PATHS * free_path, vec3(WINDOWS * range)), vec3(PIXELS * narrowness * pixel_size));
   float widest = max_component(wide);
   vec3 narrower = vec3(0.5) / (wide * wide) - vec3(0.5 / (widest * widest));

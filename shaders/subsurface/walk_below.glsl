@@ -1,7 +1,7 @@
 // A random walk below a surface, from where a ray enters to where it leaves: walk.frag.glsl tells how. A program includes this after
 // its own `walk_leaves(weight, place, facing, u)`: the share `weight` of light leaves at `place` of a surface that faces along
 // `facing`; `u` are random numbers.
-#define STEPS 64        // what is left then leaves where the walk has left so far
+#define STEPS 256       // what is left then leaves where the walk has left so far
 #define FIRST_CHANCE 3  // steps before chance ends walks
 #define FARTHEST 12.0   // free paths that a ray looks ahead
 #define LEAST_PATH 16.0  // offsets at which walks begin below the surface: where a free path is less than one, none would come out

@@ -475,19 +475,19 @@ def walked_through(paths, albedo, walks=200_000):
     return left / walks
 
 
-@pytest.mark.parametrize(("paths", "within"), [(0.5, 0.03), (3.0, 0.03), (8.0, 0.07)])
+@pytest.mark.parametrize(("paths", "color"), [(0.5, 0.8), (3.0, 0.8), (8.0, 0.8), (8.0, 0.95)])
 @pytest.mark.parametrize("behind", [True, False])
-def test_walks_through_a_slab_are_plain_walks(stage, paths, within, behind):
-    """A part of what comes through eight free paths is the plane's profile, that of a slab by a fit."""
-    material = scattering(stage, "RANDOM_WALK", 0.1 * WALK, color=(0.8, 0.8, 0.8))
+def test_walks_through_a_slab_are_plain_walks(stage, paths, color, behind):
+    """Of a colour of .95 a seventh of what comes through eight free paths was lost when walks had 64 steps."""
+    material = scattering(stage, "RANDOM_WALK", 0.1 * WALK, color=(color,) * 3)
     material.node_tree.nodes[0].inputs["Roughness"].default_value = 0.0
     stage.rectangle((-3, -3), (3, 3), material=material)
     stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1 * paths
     stage.light("SUN", turn=(np.pi if behind else 0.0, 0, 0), energy=np.pi, angle=0.0)
     stage.camera_above(0.5)
-    albedo = 1.0 - (4.20863 * 0.8 + 4.09712 - np.sqrt(9.59217 + 41.6808 * 0.8 + 17.7126 * 0.64)) ** 2
-    expected = walked_through(paths, albedo)[int(behind)]
-    assert shown(stage.render(4, size=(24, 24))).mean() == pytest.approx(expected, rel=within)
+    root = np.sqrt(9.59217 + 41.6808 * color + 17.7126 * color**2)
+    expected = walked_through(paths, 1.0 - (4.20863 * color + 4.09712 - root) ** 2)[int(behind)]
+    assert shown(stage.render(4, size=(24, 24))).mean() == pytest.approx(expected, rel=0.03)
 
 
 def test_walks_in_a_white_body_under_an_even_world_lose_nothing(stage):
