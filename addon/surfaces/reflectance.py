@@ -29,7 +29,7 @@ from .draw import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
 MOST_CELLS = 32  # that are averaged one by one
-BANDS = 8  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
+BANDS = 9  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
 VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
 REFLECTANCE = passes.fullscreen_program(

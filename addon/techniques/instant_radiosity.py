@@ -162,8 +162,9 @@ def _used(snapshot: Snapshot) -> list[Graph]:
     return [snapshot.materials[m].graph for m in snapshot.used_materials]
 
 
-def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet) -> dict:
-    """What shaders/indirect/near.glsl needs: textures, blocks and constants of this sample. Provides it to others."""
+def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet, **constants) -> dict[str, dict]:
+    """What shaders/indirect/near.glsl needs: textures, blocks and constants of this sample, with these `constants` of
+    the technique. Provides it to others; what is returned is the caller's own."""
     bindings = finder.path_bindings(frame)
     bindings["textures"]["virtual_lights"] = lights.image
     near = near_radius(frame, lights.wanted)
@@ -172,9 +173,9 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
         "deeper": deeper_weight(frame),
         "lobe_rays": 1 if frame.settings.schedule.is_draft else LOBE_RAYS,
     }
-    bindings["constants"]["shaded_roughness"] = shaded_roughness(frame)
+    bindings["constants"] |= {"shaded_roughness": shaded_roughness(frame), **constants}
     frame.provide(GatherBindings(bindings))
-    return bindings
+    return {kind: dict(bound) for kind, bound in bindings.items()}
 
 
 def deeper_weight(frame: Frame) -> float:
@@ -237,16 +238,16 @@ class InstantRadiosity(Technique):
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         wanted = frame.settings.get(self, "virtual_lights")
-        part = self._interleaving
+        part = self._interleaving if self._interleaving and self._interleaving.is_part(frame.sample) else None
         if part is not None:  # those of all groups together are as many as a picture has
             wanted = max(wanted // part.count, min(wanted, FEWEST_LIGHTS))
         lights = yield from self.virtual_lights.make(frame, self, wanted)
-        bindings = gather_bindings(frame, self.virtual_lights, lights)
-        constants = bindings["constants"]
-        constants["rays"] = self._rays(frame)
-        constants |= self._reach(frame, -(-lights.wanted // SUBSETS))
+        reach = self._reach(frame, -(-lights.wanted // SUBSETS))
+        bindings = gather_bindings(frame, self.virtual_lights, lights, rays=self._rays(frame), **reach)
+        if self._interleaving is not None:  # turns are those of each pixel; what has no block looks in each sample
+            deeper = _deeper_turn(part.visit(frame.sample), part.visits) if part is not None else 1.0
+            bindings["constants"]["deeper"] = deeper
         yield
-        bindings["textures"] = dict(bindings["textures"])  # not of those who gather these lights, too
         program = gather_program(self.virtual_lights.kinds, *lobes_of(frame), part is not None)
         program = lit_at_hits(frame, program, bindings["textures"])
         if part is None:
@@ -263,9 +264,7 @@ class InstantRadiosity(Technique):
         """Draw one pixel of each rectangle, in an image of these alone: processors skip groups of pixels, but no
         single ones."""
         place = {"rectangle": (part.columns, part.rows), "place_within": part.place(frame.sample)}
-        deeper = _deeper_turn(part.visit(frame.sample), frame.settings.samples // part.count)
-        constants = {**bindings["constants"], **place, "deeper": deeper}
-        bindings = {**bindings, "constants": constants}  # not of those who gather these lights, too
+        bindings = {**bindings, "constants": {**bindings["constants"], **place}}
         size = part.size(*frame.size)
         with images.borrowed(*size, "RGBA32F") as diffuse, images.borrowed(*size, "RGBA32F") as glossy:
             drawn = images.Target((*diffuse.colors, *glossy.colors))

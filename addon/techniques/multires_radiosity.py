@@ -197,7 +197,6 @@ class MultiresRadiosity(InstantRadiosity):
         scale = frame.typical_distance
         lights = yield from self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
-        bindings["constants"] = dict(bindings["constants"])  # not of those who gather these lights, too
         if shown_alone(frame):
             bindings["constants"]["near_radius"] *= FARTHER
         if not frame.settings.get(self, "near_bounces"):

@@ -169,7 +169,7 @@ void main()
     position = origin + t * onward;
     travelled += t;
     apart += apart_angle * t;
-    flux *= passing_media(origin, onward, t);
+    flux *= layers_color(t) * passing_media(origin, onward, t);
     blur_squared += lobe_spread * lobe_spread * t * t;
     vec3 normal = triangle_normal(hit);
     int material = triangle_material(hit);

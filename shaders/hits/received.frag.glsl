@@ -128,8 +128,8 @@ vec3 indirect_light(Receiver r, uvec3 roll)
   vec3 lit = r.surface.normal;
   vec3 side = r.surface.geometric_normal;
   vec3 position = r.surface.position;
-  if (reflection.through > 0.0) {
-    bool passes = to_unit(hash3(roll).x) < reflection.through;
+  if (max_component(reflection.through) > 0.0) {
+    bool passes = reflects_far_side(reflection, to_unit(hash3(roll).x));
     position -= passes ? max(-reflection.rough, 0.0) * side : vec3(0.0);
     lit = passes ? -lit : lit;
     side = passes ? -side : side;

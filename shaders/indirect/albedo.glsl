@@ -6,7 +6,7 @@
 // A diffuse part and one lobe of microfacets, whose reflectance runs from `straight` at normal incidence to `grazing`.
 struct Reflection {
   vec3 diffuse;  // albedo, with what passes to the other side
-  float through; // share of it that passes
+  vec3 through;  // share of it that passes
   float rough;   // of the diffuse part; below 0 a strand of hair, which is so thick, m
   vec3 straight;
   vec3 grazing;
@@ -67,19 +67,19 @@ Reflection surface_reflection(Surface s, float mu)
   Reflection r;
   r.diffuse = s.diffuse;
   r.rough = s.diffuse_roughness;
-  r.through = 0.0;
+  r.through = vec3(0.0);
   r.straight = vec3(0.0);
   r.grazing = vec3(0.0);
   r.alpha = 1.0;
   if (s.kind > LOBE_REFRACTION) {
     r.diffuse += s.glossy_weight * soft_lobe_albedo(s);
     if (s.kind == LOBE_TRANSLUCENT) {
-      r.through = luminance(s.glossy_weight) / max(luminance(r.diffuse), 1e-30);
+      r.through = s.glossy_weight / max(r.diffuse, vec3(1e-30));
     }
     // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
     for (bool fibre = s.kind == LOBE_TOON && s.glossy_tint.z < 0.9; fibre; fibre = false) {
       float thick = 2.0 * hair_radius(s.glossy_edge);
-      r.through = hair_through(s.glossy_ior) * luminance(s.glossy_weight) / max(luminance(r.diffuse), 1e-30);
+      r.through = hair_through(s.glossy_ior) * s.glossy_weight / max(r.diffuse, vec3(1e-30));
       r.rough = (thick > 2.0 * HAIR_FLAT) ? -thick : r.rough;
       r.alpha = 15.0 * max(0.9 - s.glossy_anisotropy, 0.0) * (1.3 - s.glossy_roughness);
     }
@@ -99,6 +99,19 @@ Reflection surface_reflection(Surface s, float mu)
   }
   r.diffuse = max(r.diffuse, vec3(0.0));
   return r;
+}
+
+// Of what shines through (leaves, paper) one of both sides is looked at, at random: as often the far one as its share of
+// all diffuse light. `r` becomes what is received there, over the chance of that. `u`: random, 0 to 1.
+bool reflects_far_side(inout Reflection r, float u)
+{
+  float chance = luminance(r.through * r.diffuse) / max(luminance(r.diffuse), 1e-30);
+  bool far = u < chance;
+  r.diffuse *= far ? r.through / max(chance, 1e-6) : (vec3(1.0) - r.through) / max(1.0 - chance, 1e-6);
+  float shine = far ? 0.0 : 1.0 / max(1.0 - chance, 1e-6);
+  r.straight *= shine;
+  r.grazing *= shine;
+  return far;
 }
 
 // Light that shines through a strand goes on about as it came: over what goes to all sides alike

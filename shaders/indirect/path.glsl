@@ -12,7 +12,7 @@
 #include "ask/media.glsl"
 #include "ask/leaving.glsl"
 
-#define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
+#define REFLECTANCE_BANDS 9  // see indirect/reflectance.frag.glsl
 #define LAYERS_PASSED 16     // surfaces that a ray to a light goes through that they do not block
 
 struct Vertex {
@@ -75,7 +75,7 @@ Reflection mean_reflection(ivec2 hit)
   Reflection mean;
   vec4 diffuse = reflectance_fetch(place + ivec2(0, rows));
   mean.diffuse = diffuse.rgb;
-  mean.through = diffuse.a / max(luminance(diffuse.rgb), 1e-30);
+  mean.through = reflectance_fetch(place + ivec2(0, 8 * rows)).rgb / max(diffuse.rgb, vec3(1e-30));
   mean.straight = straight.rgb;
   vec4 grazing = reflectance_fetch(place + ivec2(0, 3 * rows));
   mean.grazing = grazing.rgb;
@@ -163,15 +163,10 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
     met.reflection.diffuse *= onward;
   }
   met.lit = met.normal;
-  float through = met.reflection.through;
-  if (through > 0.0) {
-    // Leaves, paper: one of both sides is looked at, at random.
-    bool passes = to_unit(hash3(uvec3(salt, uint(hit.x), uint(hit.y))).x) < through;
+  if (max_component(met.reflection.through) > 0.0) {
+    bool passes = reflects_far_side(met.reflection, to_unit(hash3(uvec3(salt, uint(hit.x), uint(hit.y))).x));
     met.lit = passes ? -met.normal : met.normal;
     met.turned = passes ? -met.turned : met.turned;
-    float shine = passes ? 0.0 : 1.0 / max(1.0 - through, 1e-6);
-    met.reflection.straight *= shine;
-    met.reflection.grazing *= shine;
   }
   return true;
 }

@@ -1,8 +1,8 @@
 // Means of what a material reflects: over a cell of pixels, each of which shows some point of it. Bands of rows hold, one
-// above the other, all of it, its diffuse part, with the luminance that passes to the other side, and of its lobe the reflectance at normal incidence, with alpha, and at
+// above the other, all of it, its diffuse part, and of its lobe the reflectance at normal incidence, with alpha, and at
 // grazing incidence, with the roughness of the diffuse part. Then three for how normal maps and bumps turn normals n to n + d:
-// rows of the mean of d n^T, with the diagonal of that of n n^T, and last the latter's yz, zx, xy. Both are the same from
-// behind.
+// rows of the mean of d n^T, with the diagonal of that of n n^T, and the latter's yz, zx, xy. Both are the same from
+// behind. Last, what of the diffuse part passes to the other side.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
@@ -31,10 +31,11 @@ void main()
         Reflection r = surface_reflection(s, view_cosine);
         vec3 base = s.base_normal;
         vec3 moved = s.normal - base;
-        sum += (band > 6) ? vec4(base.yzx * base.zxy, 0.0)
+        sum += (band > 7) ? vec4(r.through * r.diffuse, 0.0)
+             : (band > 6) ? vec4(base.yzx * base.zxy, 0.0)
              : (band > 3) ? vec4(moved[band - 4] * base, base[band - 4] * base[band - 4])
              : (band == 0) ? vec4(surface_albedo(s, view_cosine), mirrors_photons(s, r))
-             : (band == 1) ? vec4(r.diffuse, r.through * luminance(r.diffuse))
+             : (band == 1) ? vec4(r.diffuse, 0.0)
              : (band == 2) ? vec4(r.straight, r.alpha)
                            : vec4(r.grazing, r.rough);
         count += 1.0;

@@ -82,7 +82,7 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
                  && trace_layers(origin, kept_direction, reach, reach, salt, true, true, hit) < reach;
   float through = min(light_distance(light, origin, kept_direction), FARTHEST_MEDIUM);
-  kept_light *= blocked ? vec3(0.0) : media_transmittance(origin, kept_direction, through, salt);
+  kept_light *= blocked ? vec3(0.0) : layers_color(1e30) * media_transmittance(origin, kept_direction, through, salt);
   return blocked ? vec3(0.0) : kept_light * (total / kept_importance);
 }
 
@@ -194,6 +194,7 @@ void main()
     vec3 normal = vec3(0.0);
     if (goes_on) {
       t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, false, hit);
+      throughput *= layers_color(t);
       gained += throughput * light_found(origin, direction, lobe_density, t, world_transmission != 0 && !clear, roll.z);
       hole = (clear && t >= 1e29) ? dot(throughput, vec3(1.0 / 3.0)) : 0.0;
       goes_on = t < 1e29;
@@ -248,7 +249,7 @@ void main()
       rest.met.straight = vec3(1.0);
       rest.met.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
       rest.met.reflection.rough = 0.0;
-      rest.met.reflection.through = 0.0;
+      rest.met.reflection.through = vec3(0.0);
       rest.met.reflection.straight = vec3(0.0);
       rest.met.reflection.grazing = vec3(0.0);
       rest.met.reflection.alpha = 1.0;

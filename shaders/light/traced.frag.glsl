@@ -116,7 +116,7 @@ vec3 light_of_lobe(Surface s, ivec2 pixel, uvec3 salt)
       vec3 light = arriving(pixel, s.position, kept_direction, kept_density, alone, limit, ignored);
       found = kept_weight * light * (total / (kept_importance * float(count)));
       float reach = (kept_span.x < 1e28) ? kept_span.x : FARTHEST_MEDIUM;
-      found *= media_transmittance(origin, kept_direction, reach, salt.x);
+      found *= media_transmittance(origin, kept_direction, reach, salt.x) * layers_color(reach);
     }
   }
   if (emissive_power > 0.0 && s.glossy_roughness > shaded_roughness) {
@@ -128,6 +128,7 @@ vec3 light_of_lobe(Surface s, ivec2 pixel, uvec3 salt)
     }
     vec3 origin = start_of_ray(s, direction, layers);
     float t = trace_nearest(origin, direction, 1e29, layers, hit);
+    weight *= layers_color(t);
     if (t < 1e29) {
       vec3 normal;
       vec3 emission = triangle_emission(hit, direction, normal);

@@ -11,14 +11,15 @@ vec3 asked_arriving(Asked asked, vec3 position, uint salt)
   if (!(max_component(abs(asked.found)) > 0.0)) {
     return vec3(0.0);
   }
-  float clear = 1.0;
+  vec3 clear = vec3(1.0);
   if (asked.shadow) {
     ivec2 hit;
     float until = asked.reach * 0.9999;
-    clear = (trace_layers(position, asked.direction, until, until, salt, asked.glass_stops, true, hit) >= until) ? 1.0 : 0.0;
+    bool passes = trace_layers(position, asked.direction, until, until, salt, asked.glass_stops, true, hit) >= until;
+    clear = passes ? layers_color(until) : vec3(0.0);
   }
-  if (clear <= 0.0) {
+  if (max_component(clear) <= 0.0) {
     return vec3(0.0);
   }
-  return asked.found * media_transmittance(position, asked.direction, min(asked.reach, FARTHEST_MEDIUM), salt + 7u);
+  return asked.found * clear * media_transmittance(position, asked.direction, min(asked.reach, FARTHEST_MEDIUM), salt + 7u);
 }

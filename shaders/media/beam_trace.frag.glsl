@@ -195,7 +195,7 @@ void main()
     if (missed) {
       return;
     }
-    flux *= media_transmittance(position, direction, t, seed + uint(i));  // in glass, too: fog fills what stands in it
+    flux *= layers_color(t) * media_transmittance(position, direction, t, seed + uint(i));  // in glass, too: fog fills what stands in it
     travelled += t;
     position += t * direction;
     vec4 glass = beam_table_fetch(ivec2(0, material));

@@ -28,16 +28,15 @@
 #define SCATTERS_ON true
 #endif
 
-#define REFLECTANCE_BANDS 8  // see indirect/reflectance.frag.glsl
+#define REFLECTANCE_BANDS 9  // see indirect/reflectance.frag.glsl
 
-// `through`: how much of it leaves on the other side.
-vec3 mean_albedo(ivec2 hit, out float through)
+// `through`: what of it leaves on the other side.
+vec3 mean_albedo(ivec2 hit, out vec3 through)
 {
   int material = triangle_material(hit);
   ivec2 place = ivec2(material & 15, material >> 4);
   vec3 albedo = reflectance_fetch(place).rgb;
-  float passes = reflectance_fetch(place + ivec2(0, reflectance_size().y / REFLECTANCE_BANDS)).a;
-  through = clamp(passes / max(luminance(albedo), 1e-30), 0.0, 1.0);
+  through = min(reflectance_fetch(place + ivec2(0, 8 * (reflectance_size().y / REFLECTANCE_BANDS))).rgb, albedo);
   return albedo;
 }
 
@@ -159,6 +158,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
   LampRays rays = lamp_rays(number, ask_turn);
   bool lit_exists = false;
   vec3 lit = vec3(0.0);  // the surface where a ray of the lamp ends
+  vec3 lit_color = vec3(1.0);  // of layers that it has passed
 #ifdef STRAIGHT_ALONE
   int task = GO_ON;
 #else
@@ -212,6 +212,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     if (from_source) {
       lit_exists = hit.x >= 0;
       lit = from + limit * way;
+      lit_color = layers_color(limit);
       continue;
     }
     vec3 passed = weight * stop_sends(stop, way, lobe, seed);
@@ -260,7 +261,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       density = lobe * chance * (around.exists ? 0.5 * (density + around_density(around, t)) : density);
       density = (aimed > 0.0) ? mix(density, lamp_rays_density(aiming, from, way, t), aimed) : density;
       position += t * way;
-      arrives = passed * bin_passing(k, t) / max(density, 1e-30);
+      arrives = passed * layers_color(t) * bin_passing(k, t) / max(density, 1e-30);
       if (doing == LOOK && number >= 0) {
         asked = ask_scattered(number, bins.media[k], position, -way, ask_turn, seed);
       }
@@ -279,16 +280,20 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       normal = (dot(normal, way) > 0.0) ? -normal : normal;
       vec3 met = position + limit * way;
       position = ray_origin(met, normal);
-      float through;
-      vec3 bounced = passed * bins.end * mean_albedo(hit, through);
+      vec3 through;
+      vec3 albedo = mean_albedo(hit, through);
+      // Of leaves, paper, cloth one of both sides is looked at, at random.
+      float far_chance = luminance(through) / max(luminance(albedo), 1e-30);
+      bool far = far_chance > 0.0 && media_random(seed) < far_chance;
+      albedo = far ? through / far_chance : (albedo - through) / max(1.0 - far_chance, 1e-6);
+      vec3 bounced = passed * layers_color(limit) * bins.end * albedo;
       // Light from below the surface takes the place of what a diffuse one would send.
       vec3 sent;
       vec3 part;
       vec3 same;
       bool leaves = light_leaves(triangle_material(hit), position, normal, -way, seed, sent, part, same);
       vec3 straight_on = leaves ? bounced * (vec3(1.0) - part) : bounced;
-      // Of leaves, paper, cloth one of both sides is looked at, at random.
-      if (through > 0.0 && media_random(seed) < through) {
+      if (far) {
         normal = -normal;
         position = ray_origin(met, normal);
       }
@@ -304,6 +309,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
           vec3 arriving = offset * inversesqrt(squared);
           asked.direction = -arriving;
           asked.reach = sqrt(squared);
+          asked.found *= (doing == GO_ON) ? vec3(1.0) : lit_color;
           asked.shadow = asked.shadow && doing == GO_ON;  // the lamp's own ray has come here
           from_lamp = lamp_rays_share(rays, arriving) * abs(dot(normal, arriving)) / squared;
           from_lamp *= limit * limit / max(abs(dot(normal, way)), 1e-6);

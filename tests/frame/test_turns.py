@@ -70,11 +70,25 @@ def test_pixels_share_out_samples_evenly(samples, groups):
         assert np.ptp(np.bincount(first.astype(int), minlength=4)) == 0
 
 
+@pytest.mark.parametrize("samples", [9, 50, 100, 250])
+@pytest.mark.parametrize("groups", [2, 3, 7])
+def test_what_is_no_whole_block_of_a_half_is_drawn_in_all_pixels(samples, groups):
+    part = interleaving(groups, samples)
+    half, weight = samples // 2, {place: [0, 0] for place in part.places}
+    for sample in range(samples):
+        for place in [part.place(sample)] if part.is_part(sample) else part.places:
+            weight[place][sample >= half] += part.count if part.is_part(sample) else 1
+    assert set(map(tuple, weight.values())) == {(half, samples - half)}
+    assert sum(not part.is_part(sample) for sample in range(samples)) <= 2 * part.count - 1
+    visits = [part.visit(sample) for sample in range(samples) if part.is_part(sample)]
+    assert visits == [k for k in range(part.visits) for _ in range(part.count)]
+
+
 def test_groups_begin_at_different_pixels():
     places = {interleaving(4, 16, first).place(5) for first in range(4)}
     assert len(places) == 4
 
 
-@pytest.mark.parametrize(("groups", "samples"), [(1, 64), (4, 1), (4, 7), (2, 6), (2, 9)])
+@pytest.mark.parametrize(("groups", "samples"), [(1, 64), (4, 1), (4, 7), (2, 6), (2, 7)])
 def test_few_samples_and_single_pictures_draw_every_pixel(groups, samples):
     assert interleaving(groups, samples) is None

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from tests.techniques.foggy_stage import box, volume
+
 COLOR = (0.9, 0.3, 0.1)
 
 
@@ -32,3 +34,65 @@ def test_bounced_light_has_the_colours_of_the_panes_that_it_passed(stage, sample
     clear = indirect(stage, samples)
     room(stage, COLOR, panes)
     assert indirect(stage, samples) / clear == pytest.approx(np.array(COLOR) ** panes, rel=0.06)
+
+
+def below_a_pane(stage, color, material):
+    """Fog and a surface below a pane that all of a sun's light passes, seen from below it."""
+    stage.clear()
+    stage.camera((0, -2.5, 1.0), (1.1, 0, 0), angle=1.0)
+    stage.floor(1.5, material=material(stage))
+    glass = stage.material("ShaderNodeBsdfTransparent", Color=(*color, 1))
+    stage.rectangle((-9, -9), (9, 9), 2.2, material=glass)
+    stage.light("SUN", (0, 0, 4), (-1.1, 0, 0), energy=3.0, angle=0.3)
+
+
+def mist(stage):
+    box(stage, volume(stage, Color=(1, 1, 1, 1), Density=0.5), (-1, -1, 0.1), (1, 1, 1))
+
+
+def of_pass(stage, name, samples, **options):
+    return stage.render(samples, size=(24, 20), **options)[name][..., :3].mean((0, 1))
+
+
+@pytest.mark.parametrize("samples", [1, 8])
+def test_fog_below_a_pane_has_its_colour(stage, samples):
+    """Light that is scattered once, and what surfaces scatter on into the fog."""
+    found = []
+    for color in ((1, 1, 1), COLOR):
+        below_a_pane(stage, color, lambda stage: stage.diffuse(0.7))
+        mist(stage)
+        passes = stage.render(samples, size=(24, 20), bounces=2)
+        found.append([passes[name][..., :3].mean((0, 1)) for name in ("volume_direct", "volume_indirect")])
+    (straight, further), (coloured, coloured_further) = found
+    assert straight.min() > 1e-3 and further.min() > 1e-4
+    assert coloured / straight == pytest.approx(
+        np.array(COLOR), rel=0.03 if samples > 1 else 0.1
+    )  # it passes by chance
+    assert coloured_further / further == pytest.approx(np.array(COLOR), rel=0.1)
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.4])
+def test_gloss_below_a_pane_shows_a_lamp_in_its_colour(stage, roughness):
+    found = []
+    for color in ((1, 1, 1), COLOR):
+        below_a_pane(stage, color, lambda stage: stage.principled(Metallic=1.0, Roughness=roughness))
+        found.append(of_pass(stage, "glossy_direct", 8))
+    clear, coloured = found
+    assert clear.min() > 1e-3
+    assert coloured / clear == pytest.approx(np.array(COLOR), rel=0.03)
+
+
+def test_glass_below_a_pane_shows_a_lamp_in_its_colour(stage):
+    """A sheet of glass before the lamp, which is seen through it and through the pane."""
+    found = []
+    for color in ((1, 1, 1), COLOR):
+        stage.clear()
+        stage.camera((0, 0, 0), (np.pi, 0, 0), angle=0.8)
+        stage.rectangle((-9, -9), (9, 9), 1.0, material=stage.material("ShaderNodeBsdfGlass", Roughness=0.2, IOR=1.3))
+        stage.rectangle((-9, -9), (9, 9), 2.0, material=stage.material("ShaderNodeBsdfTransparent", Color=(*color, 1)))
+        stage.light("SUN", (0, 0, 4), (0, 0, 0), energy=3.0, angle=0.3)
+        passes = stage.render(32, size=(24, 20), bounces=2)
+        found.append(sum(passes[f"transmission_{part}"][..., :3].mean((0, 1)) for part in ("direct", "indirect")))
+    clear, coloured = found
+    assert clear.min() > 1e-3
+    assert coloured / clear == pytest.approx(np.array(COLOR), rel=0.03)

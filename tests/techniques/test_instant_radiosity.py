@@ -278,6 +278,26 @@ def test_lobes_without_microfacets_get_the_light_of_other_surfaces_as_in_cycles(
     assert found[on_card].mean() == pytest.approx(expected[on_card].mean(), rel=0.05)
 
 
+def test_cloth_of_two_colours_sends_its_front_back_and_its_translucency_on(stage):
+    """A sun along the floor meets a red sheet that shines blue: the floor before it is red, that behind it blue."""
+    cloth = stage.material("ShaderNodeAddShader")
+    tree = cloth.node_tree
+    add = next(node for node in tree.nodes if node.type == "ADD_SHADER")
+    for k, (kind, color) in enumerate((("Diffuse", (0.6, 0, 0, 1)), ("Translucent", (0, 0, 0.6, 1)))):
+        node = tree.nodes.new("ShaderNodeBsdf" + kind)
+        node.inputs["Color"].default_value = color
+        tree.links.new(node.outputs[0], add.inputs[k])
+    stage.floor(half=1.5, material=stage.diffuse(0.8))
+    stage.mesh([(0, -1.5, 0), (0, 1.5, 0), (0, 1.5, 1.5), (0, -1.5, 1.5)], [(0, 1, 2, 3)], material=cloth)
+    stage.light("SUN", turn=(0, -np.pi / 2, 0), energy=3.0, angle=0.0)  # towards +x
+    stage.camera_above(3.0)
+    stage.scene.candela.denoise_strength = 0.0  # which knows one floor alone
+    found = light_paths(stage.render(16, (24, 24), bounces=1))["diffuse_indirect"]
+    before, behind = found[:, :11].mean((0, 1)), found[:, 13:].mean((0, 1))
+    assert before[0] > 0.01 and before[2] < 1e-3 * before[0]
+    assert behind[2] > 0.01 and behind[0] < 1e-3 * behind[2]
+
+
 @pytest.mark.parametrize("sun", [-1.0, 1.0])
 def test_rough_diffuse_surfaces_send_on_what_they_do_in_cycles(stage, sun):
     """A floor in the sun lights a wall: rough, it sends less there than its colour says, and more back to the sun."""
