@@ -19,7 +19,7 @@ BOUNCES = Param(
     "Maximum number of reflections of indirect light before it reaches the visible surface; 0: direct light only",
     0, 64,
 )  # fmt: skip
-DRAFT_BOUNCES = 4
+DRAFT_BOUNCES = 8
 SAMPLE_OFFSET = Param(
     "sample_offset", "Sample Offset", 0,
     "First sample to render, where several machines share the samples of a picture",
@@ -103,7 +103,7 @@ class Settings:
         return self.samples_to_draw < self.samples
 
     def as_draft(self) -> Settings:
-        """The same for a picture of a moment. Light of more bounces than four is faint, and costs as much as before."""
+        """The same for a picture of a moment. Light of more bounces than eight is faint."""
         return replace(self, schedule=self.schedule.as_draft(), bounces=min(self.bounces, DRAFT_BOUNCES))
 
     def with_all_samples(self) -> Settings:

@@ -145,6 +145,11 @@ def test_a_draft_takes_at_most_what_is_declared_for_it(count, drawn):
     assert replace(settings, schedule=AT_REST).of(Drafted()) == (count, True, 0.5)
 
 
-@pytest.mark.parametrize(("bounces", "drawn"), [(0, 0), (1, 1), (16, 4)])
+@pytest.mark.parametrize(("bounces", "drawn"), [(0, 0), (1, 1), (16, 8)])
 def test_a_draft_has_few_bounces(bounces, drawn):
     assert Settings(bounces=bounces).as_draft().bounces == drawn
+
+
+def test_a_draft_holds_nearly_all_that_bright_walls_reflect():
+    """In a closed room of walls that reflect .6 those reflections that are left out hold .6^bounces of the light."""
+    assert 0.6 ** Settings(bounces=64).as_draft().bounces < 0.02
