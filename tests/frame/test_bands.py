@@ -1,5 +1,7 @@
 """Bands: they cover a picture once, and their size follows the time they take."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from addon.frame import bands as bands_module
@@ -78,3 +80,15 @@ def test_gpu_is_behind_by_no_more_than_it_may(monkeypatch, seconds, most):
         limit.sample()
     assert most / 2 <= gpu.longest <= most
     assert gpu.awaited == pytest.approx(0.9 * seconds * (3000 - gpu.asked))
+
+
+def test_the_queue_is_asked_after_as_many_samples_as_fit(monkeypatch):
+    """Samples of a tenth of a second, where ten may lie between two waits: twice as many each time, up to those."""
+    clock, asked = [0.0], []
+    monkeypatch.setattr(bands_module.time, "perf_counter", lambda: clock[0])
+    limit = QueueLimit(SimpleNamespace(awaited=0.0), 1.0 + 1e-6)
+    monkeypatch.setattr(bands_module.images, "finish", lambda: asked.append(round(clock[0] / 0.1)))
+    for _ in range(39):
+        clock[0] += 0.1
+        limit.sample()
+    assert asked == [1, 3, 7, 15, 25, 35]

@@ -5,7 +5,7 @@ import pytest
 
 from addon.gfx import images, passes
 from addon.gfx.struct import Block
-from addon.scene.panorama import ANSWERS, eye_of, tiles_of
+from addon.scene.panorama import ANSWERS, eye_of, look, tiles_of
 from addon.scene.view import VIEW, View
 from addon.snapshot.camera import mean_angle
 from addon.snapshot.panorama import Panorama, Stereo
@@ -133,3 +133,20 @@ def test_the_lens_lies_across_each_direction_and_eyes_stand_beside_it():
     assert eye_of(eye, np.array([0.0, 1.0, 0.0]), (0, 0)) == pytest.approx([0.0, 0.0, 0.0])
     above = np.array([0.0, np.sin(1.1), np.cos(1.1)])
     assert eye_of(eye, above, (0, 0)) == pytest.approx([0.03 * np.cos(np.pi / 4), 0.0, 0.0])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_tiles_look_from_where_their_eye_stands(turn, gpu_context):
+    """An eye of a pair, whose distance from the middle is the same in all directions of the horizon."""
+    pair = Panorama("EQUIRECTANGULAR", CAMERAS["equirectangular"].values, Stereo(0.03))
+    view = view_of(pair)
+    view.camera.matrix[:3, :3] = [(np.cos(turn), 0, np.sin(turn)), (0, 1, 0), (-np.sin(turn), 0, np.cos(turn))]
+    tiles = tiles_of(view)
+    look(tiles, view, 0, 0, 10.0, (0.0, 0.0), (0.1, 0.1))
+    right, up, back = view.camera.matrix[:3, :3].T
+    for tile in tiles:
+        x, _, z = tile.middle
+        across = np.array([z, 0.0, -x]) / max(np.hypot(x, z), 1e-30)
+        expected = (1.0, 2.0, 3.0) + 0.03 * (across[0] * right + across[1] * up - across[2] * back)
+        assert tile.block.value("eye")[:3] == pytest.approx(expected, abs=1e-6)
+    assert len({tuple(np.round(tile.block.value("eye"), 4)) for tile in tiles}) > 3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
-from addon.film.neighbours import FEW, shown_sum, smooth
+from addon.film.neighbours import FEW, means, shown_sum, smooth
 from addon.frame.schedule import AT_REST, FINAL
 from addon.frame.settings import Settings
 from addon.gfx import images
@@ -70,6 +70,16 @@ def test_grain_on_a_plane_falls_as_by_two_hundred_samples(filtered, grain):
     inner = filtered(grain)[8:-8, 8:-8]
     assert inner.mean() == pytest.approx(grain.mean(), rel=0.05)
     assert inner.std() < 2 * grain.std() / 16
+
+
+def test_means_of_light_alone_leave_the_colour_of_surfaces_out(frame_of, filtered, grain):
+    """What history joins: the wider mean is that of a sample by itself, before the surface reflects it."""
+    frame = frame_of(grain, albedo=0.5)
+    near, far = (images.Target((images.create(SIZE, SIZE, "RGBA32F"),)) for _ in range(2))
+    means(frame, frame.images["radiance.light"], near, far)
+    few, many = (images.read(one.colors[0])[8:-8, 8:-8, 0] for one in (near, far))
+    np.testing.assert_allclose(many, filtered(grain, albedo=0.5)[8:-8, 8:-8], rtol=1e-4)
+    assert few.std() == pytest.approx(grain.std() / 4, rel=0.2) and many.std() < few.std() / 2
 
 
 def test_textures_stay_to_the_pixel(filtered, grain):
