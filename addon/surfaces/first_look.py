@@ -2,10 +2,14 @@
 
 Programs of a scene take a driver seconds to compile. Those of a first look are one and the same for all scenes, so that
 a viewport has something to show at once, and again wherever an edit needs programs that are not there yet. The image
-beside it, the guide, tells surfaces apart: normal and inverse distance.
+beside it, the guide, tells surfaces apart: normal and inverse distance. A third one holds what surfaces and lamps emit
+towards the eye, so that a coarse picture in the pixels of the guide shows whole what is smaller than its own pixels.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -17,6 +21,7 @@ from ..scene.culling import calls
 from ..scene.geometry import SceneGeometry
 from ..scene.view import VIEW, View
 from ..snapshot.scene import Snapshot, World
+from ..sources import lights
 from ..sources.lights import ELLIPSE, RECTANGLE, SPOT_FLAG, SUN, Emitter, emitters
 
 MOST_LAMPS = 8  # the strongest; of the others half of what they give stands in the ambient light
@@ -38,10 +43,11 @@ FIRST_LOOK = Program(
     fragment="surface/first_look.frag.glsl",
     inputs=(("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance")),
     varyings=(("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal")),
-    outputs=(("VEC4", "out_look"), ("VEC4", "out_guide")),
+    outputs=(("VEC4", "out_look"), ("VEC4", "out_guide"), ("VEC4", "out_glow")),
     textures=(("RGBA32F", "instances"),),
     blocks=((VIEW, "film_view"), (LAMPS, "first_lamps")),
-    constants=(("INT", "first_instance"), ("VEC4", "flat_color"), ("VEC4", "flat_glow")),
+    # flat_glow: radiance, of the side with the normal; w: what `out_glow` has for alpha, 0: the look shows it.
+    constants=(("INT", "first_instance"), ("VEC4", "flat_color"), ("VEC4", "flat_glow"), ("VEC3", "flat_glow_behind")),
     defines=(
         ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
         ("VISIBILITY_FLAG", "film_view.visibility"),
@@ -51,9 +57,29 @@ FIRST_LOOK = Program(
 FINE = passes.fullscreen_program(
     "first look guides",
     "surface/first_look_guides.frag.glsl",
-    textures=(("RGBA16F", "guide"), ("RGBA16F", "look"), ("RGBA32F", "coarse")),
-    constants=(("FLOAT", "faint"),),
+    textures=(
+        ("RGBA16F", "guide"), ("RGBA16F", "look"), ("RGBA32F", "coarse"), ("RGBA16F", "glow"), ("R32F", "shines"),
+        ("RGBA32F", "emission"),
+    ),
+    # What glow is multiplied by as the picture shows it, 0 where nothing glows; the same of the picture's own emission.
+    constants=(("FLOAT", "faint"), ("FLOAT", "shows_glow"), ("FLOAT", "emission_scale")),
     outputs=(("VEC4", "out_fine"),),
+)  # fmt: skip
+LAMPS_SEEN = passes.fullscreen_program(
+    "first look lamps",
+    "surface/first_look_lamps.frag.glsl",
+    textures=(("RGBA16F", "guide"),),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+    constants=(("INT", "light_count"),),
+    defines=(("LIGHT_KINDS", str(lights.LAMPS)),),
+    outputs=(("VEC4", "out_glow"),),
+)
+SHINES = passes.fullscreen_program(
+    "first look shines",
+    "surface/first_look_shines.frag.glsl",
+    textures=(("RGBA16F", "glow"),),
+    constants=(("INT", "finer"),),
+    outputs=(("FLOAT", "out_shines"),),
 )
 FILL = passes.fullscreen_program(
     "first look fills in",
@@ -64,6 +90,17 @@ FILL = passes.fullscreen_program(
 FILLED = 0.1  # radiance of a white surface that faces the eye, by the exposure, in place of indirect light
 SOLID = 0.9  # opacity from which on a surface hides what is behind
 FAINT = 0.02  # radiance, by the exposure, that is as good as black where colours are compared
+EVEN, VARIED = 1.0, 0.5  # alpha of glow: its colour is known; only the mean of its surface is
+
+
+@dataclass(frozen=True)
+class Emitted:
+    """What a picture shows of what emits."""
+
+    image: images.Image  # sums of it, in the picture's pixels
+    scale: float  # what these are multiplied by as the picture shows them
+    exposure: float  # the same of radiance
+    lamps: list[Emitter]  # which the camera may see
 
 
 class FirstLook:
@@ -74,6 +111,9 @@ class FirstLook:
         self._target: images.Target | None = None
         self._view: Block | None = None
         self._lamps: Block | None = None
+        self._sources = lights.Sources()
+        self._glows = False  # a surface that was drawn emits
+        self._rows = np.zeros((4, 4))  # of the view
 
     @property
     def picture(self) -> images.Image | None:
@@ -101,12 +141,13 @@ class FirstLook:
         self._lamps = _updated(self._lamps, LAMPS, lamps)
         if self._target is None or self._target.size != view.size:
             self.release()
-            formats = ("RGBA16F", "RGBA16F", "DEPTH_COMPONENT32F")
-            look, guide, depth = (images.pool.take(*view.size, one) for one in formats)
-            self._target = images.Target((look, guide), depth)
+            formats = ("RGBA16F", "RGBA16F", "RGBA16F", "DEPTH_COMPONENT32F")
+            *colors, depth = (images.pool.take(*view.size, one) for one in formats)
+            self._target = images.Target(tuple(colors), depth)
         self._target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
         images.Target((self._target.colors[0],)).clear((0.0,) * 4 if fills else background(snapshot))
-        rows = np.array([values[row] for row in ("row_x", "row_y", "row_w", "row_q")])
+        rows = self._rows = np.array([values[row] for row in ("row_x", "row_y", "row_w", "row_q")])
+        self._glows = False
         shader, material = passes.get(FIRST_LOOK), None
         with passes.drawing(self._target):
             for call in calls(geometry.draws, np.flatnonzero(geometry.boxes.seen(rows))):
@@ -122,21 +163,45 @@ class FirstLook:
                 elif call.draw.material != material:
                     shader.change(constants=_look_of(shown, guides, fills))
                 material = call.draw.material
+                self._glows |= shown.emissive
                 shader.set_constant("first_instance", call.first)
                 passes.draw(shader, call.draw.batch, call.count)
         return self._target.colors[0]
 
-    def refined(self, coarse: images.Image, exposure: float) -> images.Image:
+    def refined(self, coarse: images.Image, exposure: float, emitted: Emitted | None = None) -> images.Image:
         """A coarse picture of what was drawn last in the pixels of that: edges and shapes of the first look, and the
-        light of the picture."""
+        light of the picture. What it shows of what is `emitted` is drawn in fine pixels, too."""
         size = self._target.size
         if self._fine is None or self._fine.size != size:
             self._give_fine()
             self._fine = images.Target((images.pool.take(*size, "RGBA16F"),))
-        textures = {"guide": self.guide, "look": self.picture, "coarse": coarse}
-        faint = FAINT / max(exposure, 1e-6)
-        passes.fullscreen(FINE, self._fine, textures=textures, constants={"faint": faint})
+        glow, glows = self._target.colors[2], emitted is not None and (self._add(emitted.lamps) or self._glows)
+        with images.borrowed(*coarse.size, "R32F") as shines:
+            if glows:
+                finer = max(size[0] // coarse.size[0], 1)
+                passes.fullscreen(SHINES, shines, textures={"glow": glow}, constants={"finer": finer})
+            textures = {
+                "guide": self.guide, "look": self.picture, "coarse": coarse, "glow": glow, "shines": shines.colors[0],
+                "emission": emitted.image if glows else coarse,
+            }  # fmt: skip
+            constants = {
+                "faint": FAINT / max(exposure, 1e-6), "shows_glow": emitted.exposure if glows else 0.0,
+                "emission_scale": emitted.scale if glows else 0.0,
+            }  # fmt: skip
+            passes.fullscreen(FINE, self._fine, textures=textures, constants=constants)
         return self._fine.colors[0]
+
+    def _add(self, lamps: list[Emitter]) -> bool:
+        """Add lamps in view to what glows; whether there are any."""
+        seen = lights.traceable([one for one in lamps if _in_view(one, self._rows)])
+        if seen:
+            sources = self._sources.set([one.row(one.centre, 0, 0) for one in seen])
+            passes.fullscreen(
+                LAMPS_SEEN, images.Target((self._target.colors[2],)), blend="ADDITIVE_PREMULT",
+                textures={"guide": self.guide}, blocks={"film_view": self._view, "sources": sources},
+                constants={"light_count": len(seen)},
+            )  # fmt: skip
+        return bool(seen)
 
     def fill_in(self, lit: images.Image, target: images.Target, *scene) -> None:
         """Into the target a picture that has direct light alone, with a faint light from the eye in its shadows.
@@ -171,8 +236,22 @@ def _lets_pass(material: CompiledMaterial) -> bool:
 
 def _look_of(material: CompiledMaterial, guides: bool, fills: bool) -> dict[str, tuple[float, ...]]:
     solid = float(guides or not (_lets_pass(material) or material.glass is not None))
-    glow = np.zeros(3) if fills else np.clip(np.nan_to_num(material.emission, posinf=1e4), 0.0, 1e4)
-    return {"flat_color": (*np.clip(material.color, 0.0, 1.0), solid), "flat_glow": (*glow, 0.0)}
+    both = np.array([material.emission, material.emission_behind])
+    front, behind = np.zeros((2, 3)) if fills else np.clip(np.nan_to_num(both, posinf=1e4), 0.0, 1e4)
+    apart = (VARIED if material.uneven_emission else EVEN) if guides else 0.0
+    return {
+        "flat_color": (*np.clip(material.color, 0.0, 1.0), solid), "flat_glow": (*front, apart),
+        "flat_glow_behind": tuple(behind),
+    }  # fmt: skip
+
+
+def _in_view(lamp: Emitter, rows: np.ndarray) -> bool:
+    """Whether the box around a lamp may be in view. `rows`: (4, 4) of the view."""
+    if lamp.kind == SUN:
+        return True
+    corners = lamp.centre + lamp.reach * np.array(list(product((-1.0, 1.0), repeat=3)))
+    x, y, w, _ = rows @ np.column_stack((corners, np.ones(8))).T
+    return not any(np.all(beyond) for beyond in (w <= 0.0, x > w, x < -w, y > w, y < -w))
 
 
 def background(snapshot: Snapshot) -> tuple[float, float, float, float]:

@@ -100,7 +100,8 @@ def drawn(renderer, looks, order, stage: str, tell=lambda **_: None):
     """Draw an order's picture as a draft or in full; yields after each part how many programs are left, as far as
     known, and what technique they are for, where they are compiled as they are met. Of a picture that is foreseen the
     first look comes first, and what it needs is told."""
-    images, library, begun, ahead = map(own, ("gfx.images", "gfx.library", "viewport.beginning", "viewport.ahead"))
+    images, library, begun = map(own, ("gfx.images", "gfx.library", "viewport.beginning"))
+    ahead, display = map(own, ("viewport.ahead", "viewport.display"))
     coarser = begun.coarser
     whole, settings = order["snapshot"], order["settings"]
     draft = stage == "draft"
@@ -130,7 +131,7 @@ def drawn(renderer, looks, order, stage: str, tell=lambda **_: None):
                 yield 1, frame.at
         shown = renderer.show(frame)
         for look in looks[1:] if shown is not None else ():
-            look.refined(shown, snapshot.film.exposure)
+            look.refined(shown, snapshot.film.exposure, display.emitted_in(frame))
     images.finish()
 
 

@@ -9,6 +9,7 @@ from math import ceil, floor
 from ..frame.picture import Frame
 from ..frame.settings import OFF, Settings
 from ..snapshot.scene import Camera, Film, Snapshot
+from ..techniques.film import EMISSION
 
 CHECKS, MOVES, CLIMBS, LIGHTS = "checks", "moves", "climbs", "lights"  # why a frame is begun
 AT_REST = (CLIMBS, LIGHTS)
@@ -45,9 +46,12 @@ def coarser(film: Film, scale: int) -> Film:
 
 def drawn_with(settings: Settings, scale: int, waits: bool) -> Settings:
     """The settings of a picture at a scale. `waits`: a part is done when the GPU has done it; a draft of a moving view
-    is drawn as one, whose passes need not wait for each other."""
+    is drawn as one, whose passes need not wait for each other. Drafts hold apart what emits, for `Display.refine`."""
     drawn = replace(settings, profile=waits)
-    return drawn.as_draft() if scale > 1 else drawn
+    if scale == 1:
+        return drawn
+    shows = drawn.shows if drawn.shows is None else drawn.shows | {EMISSION}
+    return replace(drawn.as_draft(), shows=shows)
 
 
 def only_direct(settings: Settings) -> Settings:

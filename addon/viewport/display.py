@@ -16,7 +16,9 @@ from ..materials.compiled import CompiledMaterial
 from ..scene.geometry import SceneGeometry
 from ..scene.view import View
 from ..snapshot.scene import Camera, Film, Snapshot
-from ..surfaces.first_look import FirstLook
+from ..sources.lights import CAMERA_FLAG, MAPPED_FLAG
+from ..surfaces.first_look import Emitted, FirstLook
+from ..techniques.film import EMISSION
 from .pace import GuidePace
 
 Scene = tuple[Snapshot, SceneGeometry, list[CompiledMaterial]]  # as it was read, on the GPU, and what draws it
@@ -92,7 +94,7 @@ class Display:
             film, width=film.width * finer, height=film.height * finer, border=tuple(finer * e for e in film.border)
         )
         self._guide.draw(*scene, _view(frame.snapshot.camera, whole, scene), guides=True)
-        refined = self._guide.refined(self.picture, film.exposure)
+        refined = self._guide.refined(self.picture, film.exposure, emitted_in(frame))
         images.finish()
         if library.news() == fresh:
             self.guides.learn(time.perf_counter() - started, pixels // guided**2)
@@ -128,6 +130,16 @@ class Display:
         """Free all on the GPU."""
         self.drop_picture()
         self.drop_look()
+
+
+def emitted_in(frame: Frame) -> Emitted | None:
+    """What a draft shows of what emits; None where it does not hold that apart. Lamps whose node trees vary are left to
+    the draft's own pixels."""
+    if EMISSION not in frame.images:
+        return None
+    lamps = [one for one in frame.emitters if one.flags & CAMERA_FLAG and not one.flags & MAPPED_FLAG]
+    exposure = frame.snapshot.film.exposure
+    return Emitted(frame.held.to_show(EMISSION), exposure / max(frame.samples_done, 1), exposure, lamps)
 
 
 def _view(camera: Camera, film: Film, scene: Scene) -> View:

@@ -1,5 +1,6 @@
 // A surface in one colour under the strongest lamps, without shadows (addon/surfaces/first_look.py).
 #define NO_NORMAL 1e-12
+#define MOST 60000.0  // of a half float
 
 vec3 normal_seen(vec3 toward_eye)
 {
@@ -39,6 +40,9 @@ void main()
   for (int k = 0; k < count; k++) {
     irradiance += lamp_irradiance(k, normal);
   }
-  out_look = vec4(min(flat_color.rgb * irradiance * 0.31830989 + flat_glow.rgb, vec3(60000.0)), 1.0);
-  out_guide = vec4(normal, 1.0 / max(dot(film_view.row_w, vec4(world_position, 1.0)), 1e-6));
+  vec3 glow = dot(world_normal, toward_eye) < 0.0 ? flat_glow_behind : flat_glow.rgb;
+  vec3 shown = flat_color.rgb * irradiance * 0.31830989 + (flat_glow.w > 0.0 ? vec3(0.0) : glow);
+  out_look = vec4(min(shown, vec3(MOST)), 1.0);
+  out_guide = vec4(normal, 1.0 / max(dot(film_view.eye.xyz - world_position, film_view.backward.xyz), 1e-6));
+  out_glow = dot(glow, vec3(1.0)) > 0.0 ? vec4(min(glow, vec3(MOST)), flat_glow.w) : vec4(0.0);
 }

@@ -1,8 +1,10 @@
 // A coarse picture in finer pixels, by what a first look at the same view knows of them: each takes the light of the
-// nearest coarse pixels that show the same surface, by its own colour and its own side towards the lamps.
+// nearest coarse pixels that show the same surface, by its own colour and its own side towards the lamps. What the guide
+// knows to emit is left out of coarse light and stands as the guide has it, so that small things that glow are whole.
 #define MOST_CHANGE 4.0
 #define SAME_DEPTH 0.05
 #define LEAST_WEIGHT 1e-4
+#define EVEN 0.75  // alpha of glow from which on its colour is known, not only the mean of its surface
 
 float likeness(vec4 here, vec4 there)
 {
@@ -25,8 +27,11 @@ void main()
   vec2 part = place - vec2(corner);
   vec4 guide_here = guide_fetch(pixel);
   vec3 look_here = look_fetch(pixel).rgb + vec3(faint);
+  vec4 glow_here = shows_glow > 0.0 ? glow_fetch(pixel) : vec4(0.0);
   vec4 sum = vec4(0.0);
   float weights = 0.0;
+  vec3 emitted = LEAST_WEIGHT * glow_here.rgb * shows_glow;
+  float emitting = LEAST_WEIGHT;
   for (int k = 0; k < 4; k++) {
     ivec2 step = ivec2(k & 1, k >> 1);
     ivec2 texel = clamp(corner + step, ivec2(0), size - 1);
@@ -35,6 +40,13 @@ void main()
     vec2 share = mix(1.0 - part, part, vec2(step));
     float weight = share.x * share.y * (likeness(guide_here, guide_there) + LEAST_WEIGHT);
     vec4 light = coarse_fetch(texel);
+    if (shows_glow > 0.0 && shines_fetch(texel).r > 0.5) {
+      vec3 coarse_emission = emission_fetch(texel).rgb * emission_scale;
+      light.rgb = max(light.rgb - coarse_emission, vec3(0.0));
+      float alike = glow_fetch(middle).w > 0.0 ? weight : 0.0;
+      emitted += alike * coarse_emission;
+      emitting += alike;
+    }
     if (guide_here.w > 0.0 && guide_there.w > 0.0) {
       vec3 change = look_here / (look_fetch(middle).rgb + vec3(faint));
       light.rgb *= clamp(change, vec3(1.0 / MOST_CHANGE), vec3(MOST_CHANGE));
@@ -43,4 +55,7 @@ void main()
     weights += weight;
   }
   out_fine = sum / max(weights, 1e-20);
+  if (glow_here.w > 0.0) {
+    out_fine.rgb += glow_here.w > EVEN ? glow_here.rgb * shows_glow : emitted / emitting;
+  }
 }

@@ -5,11 +5,13 @@ import itertools
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from addon import viewport
 from addon.gfx import images
 from addon.viewport.picture import Viewport
 from tests.viewport.region import SIZE
+from tests.viewport.test_compiling import material_named
 
 
 def test_moving_view_is_coarse_and_rests_in_full_resolution(region):
@@ -182,6 +184,67 @@ def test_draft_has_the_shapes_of_the_surfaces_that_it_shows(region):
         return np.abs(fine - whole).mean()
 
     assert error(region.viewport.display.shown) < 0.8 * error(region.viewport.picture)
+
+
+@pytest.mark.parametrize("scale", [8, 16])
+@pytest.mark.parametrize("shines", ["mesh", "point", "area"])
+def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, scale, shines):
+    """A ball, a lamp and a square of light, of 5 pixels across where those of the draft are 8 and 16: as bright as in
+    the whole picture, and no brighter."""
+    place = scene.camera.matrix_world @ Vector((-0.4, 0.35, -3.0))
+    if shines == "mesh":
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.05, location=place)
+        material = material_named("Glow")
+        material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+        material.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1.0, 0.5, 0.2, 1.0)
+        material.node_tree.nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 20.0
+        bpy.context.object.data.materials.append(material)
+    else:
+        bpy.ops.object.light_add(type=shines.upper(), location=place)
+        bpy.context.object.rotation_euler = (
+            scene.camera.rotation_euler[0] + np.pi,
+            0.0,
+            scene.camera.rotation_euler[2],
+        )
+        bpy.context.object.visible_camera = True
+        lamp = bpy.context.object.data
+        lamp.energy = {"point": 2.0, "area": 0.5}[shines]
+        if shines == "point":
+            lamp.shadow_soft_size = 0.05
+        else:
+            lamp.size = 0.09
+    region.viewport.dirty = True
+    whole = region.rest()[..., :3]
+    bright = whole.max(axis=-1) > 5.0
+    assert 10 <= bright.sum() <= 60
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.1 * (scale > 8) + 0.01, 16: 0.01}
+    region.viewport.display.guides.by_pixel = 0.0
+    region.viewport.coarsest = scale
+    region.camera = region.moved(1e-4)
+    region.draw()
+    assert region.viewport.scale == scale and region.viewport.display.shown.size == SIZE
+    shown = images.read(region.viewport.display.shown)[..., :3]
+    np.testing.assert_allclose(shown[bright].mean(axis=0), whole[bright].mean(axis=0), rtol=0.15)
+    assert shown.sum() == pytest.approx(whole.sum(), rel=0.15)
+
+
+def test_draft_shows_how_emission_varies_over_a_surface(scene, region):
+    """A floor that glows from 0 on the left to 4 on the right: not in its mean colour everywhere."""
+    material = material_named("Screen")
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    ramp = nodes.new("ShaderNodeTexGradient")
+    links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], ramp.inputs["Vector"])
+    links.new(ramp.outputs["Color"], nodes["Principled BSDF"].inputs["Emission Color"])
+    nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 4.0
+    bpy.data.objects["Plane"].data.materials.append(material)
+    region.viewport.dirty = True
+    whole = region.rest()[..., :3]
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.01}
+    region.viewport.display.guides.by_pixel = 0.0
+    region.camera = region.moved(1e-4)
+    region.draw()
+    shown = images.read(region.viewport.display.shown)[..., :3]
+    assert np.abs(shown - whole).mean() < 0.25 * np.abs(whole - whole.mean()).mean()
 
 
 def test_first_sample_is_shown_as_it_grows(region, monkeypatch):
