@@ -132,6 +132,7 @@ class Displacement:
         if not kinds:
             self._measured, self._meshes, self._instances, self._lists, self._pieces = {}, {}, {}, {}, {}
             return snapshot
+        materials.upload_textures()
         measured = self._measure(snapshot, materials, kinds, set(asked))
         self._decide(snapshot, materials, asked, measured)
         if self._cut:

@@ -19,7 +19,7 @@ from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..materials.reader import DEPTH_FROM_CAMERA, FINE_LAYERS
 from ..materials.working_space import current
-from ..snapshot.scene import Note, Snapshot
+from ..snapshot.scene import Image, Note, Snapshot
 from . import uv_placed
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
@@ -65,6 +65,8 @@ class MaterialSet:
         self._cache: dict[str, tuple[object, CompiledMaterial]] = {}
         self._blocks: dict[str, Block] = {}
         self._images: dict[tuple[str, int, bool], images.Image] = {}  # by key, version, and whether it has levels
+        self._keys_of_images: dict[str, tuple[str, int, bool]] = {}  # of `_images`, by name
+        self._sources: dict[str, Image] = {}  # by name
         self._used: list[str] = []
         # By material: the first one of those that share its program and block, and where in that its values begin.
         self.leaders: list[int] = []
@@ -74,7 +76,7 @@ class MaterialSet:
         self.own_images: dict[int, dict[str, images.Image]] = {}  # by material: textures of its own surface program
 
     def update(self, snapshot: Snapshot) -> None:
-        """Compile and upload what changed."""
+        """Compile what changed, and upload it but for textures, which `upload_textures` does."""
         if self.energy_table is None or self._energy_space != current().name:
             self.energy_table = images.upload(energy_texture(FINE_LAYERS))
             self._energy_space = current().name
@@ -104,10 +106,7 @@ class MaterialSet:
             for name in compiled.images:
                 levels[name] = levels.get(name, False) or name in compiled.averaging
         self._keys_of_images = {name: (name, _version(snapshot, name), levels[name]) for name in levels}
-        self._images = {
-            key: self._images.get(key) or upload_texture(snapshot.images, key[0], key[2])
-            for key in self._keys_of_images.values()
-        }
+        self._sources = snapshot.images
         self._blocks = {key: block for key, block in self._blocks.items() if key in cache}
         self._keys = [material.key for material in snapshot.materials]
         for key, compiled in zip(self._keys, self.compiled):
@@ -120,6 +119,14 @@ class MaterialSet:
 
         if len(before) != len(self.compiled) or any(one is not other for one, other in zip(before, self.compiled)):
             self.share()
+
+    def upload_textures(self) -> None:
+        """Upload those that are not there yet, and free those that no material has any more. Not while anything is
+        drawn, and before anything that `bindings` gives is: this draws their levels."""
+        self._images = {
+            key: self._images.get(key) or upload_texture(self._sources, key[0], key[2])
+            for key in self._keys_of_images.values()
+        }
 
     def share(self) -> None:
         """Find which materials can be drawn by one program with one block."""
@@ -194,7 +201,7 @@ class MaterialSet:
         """Equal in two frames if all materials shade alike."""
         return tuple(
             (c.program_key, c.values.tobytes(), c.images, c.medium and c.medium.key) for c in self.compiled
-        ) + tuple(self._images)
+        ) + tuple(self._keys_of_images.values())
 
     def around(self, index: int, geometry: SceneGeometry) -> tuple:
         """Equal in two frames if what material `index` reads of the instances that show it, and of the camera, is."""

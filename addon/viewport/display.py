@@ -14,6 +14,7 @@ from ..frame.reads import content
 from ..gfx import images, library
 from ..materials.compiled import CompiledMaterial
 from ..scene.geometry import SceneGeometry
+from ..scene.media import has_media
 from ..scene.view import View
 from ..snapshot.scene import Camera, Film, Snapshot
 from ..sources.lights import CAMERA_FLAG, MAPPED_FLAG
@@ -133,9 +134,9 @@ class Display:
 
 
 def emitted_in(frame: Frame) -> Emitted | None:
-    """What a draft shows of what emits; None where it does not hold that apart. Lamps whose node trees vary are left to
-    the draft's own pixels."""
-    if EMISSION not in frame.images:
+    """What a draft shows of what emits; None where it does not hold that apart, or media dim it. Lamps whose node trees
+    vary are left to the draft's own pixels."""
+    if EMISSION not in frame.images or has_media(frame.snapshot):
         return None
     lamps = [one for one in frame.emitters if one.flags & CAMERA_FLAG and not one.flags & MAPPED_FLAG]
     exposure = frame.snapshot.film.exposure

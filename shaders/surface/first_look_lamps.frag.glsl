@@ -1,4 +1,6 @@
 // Lamps that a picture shows, in the pixels of its guide: added to what surfaces emit there (addon/surfaces/first_look.py).
+// Leaves out media: a picture that has some shows what emits in its own pixels.
+// Leaves out links: the camera sees lamps whatever they light.
 #include "ask/view.glsl"
 #include "light/sources.glsl"
 #define SLACK 1.002  // of distances, which the guide holds as half floats

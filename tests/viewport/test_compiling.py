@@ -1,6 +1,7 @@
 """What a viewport shows while the programs of its picture are compiled, and how long a redraw takes then."""
 
 import warnings
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -42,6 +43,22 @@ def test_first_redraw_shows_the_scene_by_programs_that_are_always_the_same(cold)
     assert not cold.viewport.done
     seen = images.read(picture)
     assert seen[..., 3].max() == 1.0 and seen[..., :3].std() > 0.01
+
+
+def test_first_look_comes_before_textures_are_drawn(cold):
+    """Their levels and their packing have programs of their own."""
+    material = material_named("Textured")
+    nodes = material.node_tree.nodes
+    image = nodes.new("ShaderNodeTexImage")
+    image.image = bpy.data.images.new("Painted", 64, 64)
+    material.node_tree.links.new(image.outputs["Color"], nodes["Principled BSDF"].inputs["Base Color"])
+    bpy.data.objects["Cube"].data.materials.append(material)
+    cold.viewport.ahead = SimpleNamespace(left=lambda *_, **__: None)  # all has been compiled elsewhere
+    compiled = library.compile_count
+    cold.draw()
+    assert cold.viewport.looks and library.compile_count == compiled + 1
+    cold.draw()
+    assert library.compile_count > compiled + 1
 
 
 def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones(cold):

@@ -9,6 +9,7 @@ from mathutils import Vector
 
 from addon import viewport
 from addon.gfx import images
+from addon.viewport.pace import GuidePace
 from addon.viewport.picture import Viewport
 from tests.viewport.region import SIZE
 from tests.viewport.test_compiling import material_named
@@ -169,11 +170,16 @@ def test_drafts_between_the_first_and_the_whole_picture_are_shown(region):
     assert seen[-3:] == [4, 2, 1]
 
 
-def test_draft_has_the_shapes_of_the_surfaces_that_it_shows(region):
+@pytest.fixture
+def whole_guides(monkeypatch):
+    """Shapes of drafts are found in all pixels, however long that takes."""
+    monkeypatch.setattr(GuidePace, "scale", lambda self, pixels, draft, step: 1)
+
+
+def test_draft_has_the_shapes_of_the_surfaces_that_it_shows(region, whole_guides):
     """A coarse picture, shown in finer pixels: nearer to the whole picture than by its own."""
     whole = region.rest()[..., :3]
     region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.01}
-    region.viewport.display.guides.by_pixel = 0.0
     region.camera = region.moved(1e-4)
     region.draw()
     assert region.viewport.scale == 8 and region.viewport.display.shown.size == SIZE
@@ -188,7 +194,7 @@ def test_draft_has_the_shapes_of_the_surfaces_that_it_shows(region):
 
 @pytest.mark.parametrize("scale", [8, 16])
 @pytest.mark.parametrize("shines", ["mesh", "point", "area"])
-def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, scale, shines):
+def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, whole_guides, scale, shines):
     """A ball, a lamp and a square of light, of 5 pixels across where those of the draft are 8 and 16: as bright as in
     the whole picture, and no brighter."""
     place = scene.camera.matrix_world @ Vector((-0.4, 0.35, -3.0))
@@ -218,7 +224,6 @@ def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, sc
     bright = whole.max(axis=-1) > 5.0
     assert 10 <= bright.sum() <= 60
     region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.1 * (scale > 8) + 0.01, 16: 0.01}
-    region.viewport.display.guides.by_pixel = 0.0
     region.viewport.coarsest = scale
     region.camera = region.moved(1e-4)
     region.draw()
@@ -228,7 +233,7 @@ def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, sc
     assert shown.sum() == pytest.approx(whole.sum(), rel=0.15)
 
 
-def test_draft_shows_how_emission_varies_over_a_surface(scene, region):
+def test_draft_shows_how_emission_varies_over_a_surface(scene, region, whole_guides):
     """A floor that glows from 0 on the left to 4 on the right: not in its mean colour everywhere."""
     material = material_named("Screen")
     nodes, links = material.node_tree.nodes, material.node_tree.links
@@ -240,7 +245,6 @@ def test_draft_shows_how_emission_varies_over_a_surface(scene, region):
     region.viewport.dirty = True
     whole = region.rest()[..., :3]
     region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.01}
-    region.viewport.display.guides.by_pixel = 0.0
     region.camera = region.moved(1e-4)
     region.draw()
     shown = images.read(region.viewport.display.shown)[..., :3]
