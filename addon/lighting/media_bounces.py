@@ -33,6 +33,7 @@ from ..sources import lights
 from ..sources.environment import WORLD
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
+from ..surfaces.seen_layers import SeenLayers
 from . import froxels
 from .leaving_light import LEAVES
 from .media import RAY_TEXTURES, Rays
@@ -180,6 +181,7 @@ class MediaBounces:
         names = _names("volume", media.emits)[0 if bounces else 1 :]
         program = walks_program(PIXELS, lit.kinds, lit.world, media.emits, False, not bounces)
         program, bound = self._bound(frame, lit, program)
+        bound["textures"]["surface_position"] = frame.kept(SeenLayers).position(frame, technique)
         constants = asked | {
             "shown_pixel": (0, 0),
             "stride": 1,
@@ -235,7 +237,7 @@ class MediaBounces:
             cells_program(both), frame.target(*_names("volume", media.emits)[0 if bounces else 1 :]),
             blend="ADDITIVE_PREMULT",
             textures={
-                **media.textures, "surface_position": frame.images["surface.position"],
+                **media.textures, "surface_position": frame.kept(SeenLayers).position(frame, technique),
                 **dict(zip(("froxel_light", "froxel_straight"), found)),
             },
             blocks={"film_view": frame.view_block}, constants=grid.constants,

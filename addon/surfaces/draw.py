@@ -180,7 +180,7 @@ def _draw_layers(frame: Frame, technique: Technique, target: images.Target, view
     glass = refracts(frame)
     mode = layer_mode(frame)
     _draw_surfaces(frame, technique, target, mode, lobes_kept(frame), view, rows)
-    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.colors_behind}
+    tinted = coloring(frame)
     if not tinted:
         return
     # Multiply what was hit by the colour of the layers before it that let this sample pass.
@@ -212,6 +212,34 @@ def _draw_behind(frame: Frame, technique: Technique, target: images.Target, posi
             draw(target, view, rows, seen[0])
 
     draw_seen(frame, target, anew if frame.tiles else known, blend)
+
+
+def coloring(frame: Frame) -> set[int]:
+    """Materials that colour what passes them."""
+    return {k for k, material in enumerate(frame.materials.compiled) if material.colors_behind}
+
+
+def draw_passed_layers(frame: Frame, technique: Technique, target: images.Target, position: images.Image) -> None:
+    """Of layers that colour what passes them, and that this sample passes before the surfaces at `position`: where the
+    nearest lies (w 0: there is none) and the colour of all of them, in the first two of a target of three images with a
+    depth buffer; the third is of no use."""
+    constants = {"glass_bends": int(refracts(frame)), "transparent_mode": layer_mode(frame)}
+    program, layers = frame.materials.layer_program, coloring(frame)
+
+    def draw(target: images.Target, view: Block, rows: np.ndarray, position: images.Image) -> None:
+        read = {"surface_position": position}
+        target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+        with passes.drawing(target):
+            _submit(frame, technique, program, layers, constants, view, rows, read)
+        _, tint, other = target.colors
+        images.Target((tint,)).clear((1.0, 1.0, 1.0, 1.0))
+        with images.borrowed(*target.size, "RGBA32F") as places:
+            every = images.Target((places.colors[0], tint, other))
+            with passes.drawing(every, blend="MULTIPLY", depth_test="NONE", depth_write=False):
+                _submit(frame, technique, program, layers, constants, view, rows, read)
+
+    _draw_behind(frame, technique, target, position, draw)
+    frame.count(technique, "passes", 2)
 
 
 def add_glow(frame: Frame, technique: Technique, position: images.Image, emission: images.Image) -> None:

@@ -55,6 +55,7 @@ from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.environment import WORLD
 from ..surfaces.draw import SURFACES
+from ..surfaces.seen_layers import SeenLayers
 
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
 COARSE = 2  # pixels of one known pixel's side then
@@ -189,7 +190,7 @@ class Airlight(Technique):
         places = places_of(rays, lit.rows - lit.hidden + world)
         program, names = airlight_program(kinds, world), ("radiance.volume_direct", "radiance.volume_emission")
         bindings = {
-            "textures": textures | {"surface_position": frame.images["surface.position"]}, "blocks": blocks,
+            "textures": textures | {"surface_position": frame.kept(SeenLayers).position(frame, self)}, "blocks": blocks,
             "constants": asked | {"places": places, "shown_pixel": turn if coarse else (0, 0), "stride": stride},
         }  # fmt: skip
         if coarse:

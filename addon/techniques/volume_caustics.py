@@ -51,6 +51,7 @@ from ..scene.view import VIEW
 from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
 from ..sources import lights
+from ..surfaces.seen_layers import SeenLayers
 from .airlight import may_send, volume_graphs
 
 SMOOTH = 0.2  # roughness
@@ -154,7 +155,7 @@ class VolumeCaustics(Technique):
         drawn = [one.sample(*frame.random_volume("beams/light")) for one in turn]
         sources = self._sources.set([e.row(point, 0, 1, weight) for e, point in zip(turn, drawn)])
         traced = [images.pool.take(side, side, "RGBA32F") for _ in range(3 * STRETCHES)]
-        surfaces = {"surface_position": frame.images["surface.position"]}
+        surfaces = {"surface_position": frame.kept(SeenLayers).position(frame, self)}
         for number in range(len(turn)):
             passes.fullscreen(
                 TRACE,

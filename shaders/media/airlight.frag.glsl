@@ -42,7 +42,7 @@ void main()
     out_direct.w = min(ray.limit, 1e18);  // for what spreads this over the pixels around
     out_emission.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
   }
-  out_emission.rgb = bins.emitted;
+  out_emission.rgb = bins.emitted * ((bins.count > 0) ? layers_before(pixel, bins.from[0]) : vec3(1.0));
 #endif
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;
@@ -85,7 +85,7 @@ void main()
         density = 0.5 * (density + around_density(around, t));
       }
       vec3 position = ray.origin + t * ray.direction;
-      vec3 weight = bin_passing(k, t) / max(density, 1e-30);
+      vec3 weight = layers_before(pixel, t) * bin_passing(k, t) / max(density, 1e-30);
       uint own_salt = seed + uint(i * 64 + n);
       uvec3 turn = hash3(salt + uint(n) * 3u);
       vec2 u = vec2(scrambled(film_view.bits_x, turn.x), scrambled(film_view.bits_y, turn.y));

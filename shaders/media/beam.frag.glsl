@@ -52,6 +52,6 @@ void main()
   uint even = uint(beam_start.w - 0.5);  // see within_media in beam_trace.frag.glsl
   passing *= (even != 0u) ? exp(-min(media_depth(even, beam_start.xyz, direction, 0.0, along_beam), vec3(1e30)))
                           : media_transmittance(beam_start.xyz, direction, along_beam, seed + 1u);
-  vec3 light = beam_flux.rgb * scattered * passing * (tent / max(sqrt(sine_squared), LEAST_SINE));
+  vec3 light = beam_flux.rgb * layers_before(pixel, along_view) * scattered * passing * (tent / max(sqrt(sine_squared), LEAST_SINE));
   out_volume = vec4((is_finite(light.x) && is_finite(light.y) && is_finite(light.z)) ? light : vec3(0.0), 0.0);
 }

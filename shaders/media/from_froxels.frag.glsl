@@ -77,7 +77,7 @@ void main()
     vec3 scattering;
     vec3 emission;
     media_at(bins.media[k], ray.origin + t * ray.direction, seed, scattering, emission);
-    vec3 weight = bin_passing(k, t) * scattering / max(bins_density(k, t), 1e-30);
+    vec3 weight = layers_before(pixel, t) * bin_passing(k, t) * scattering / max(bins_density(k, t), 1e-30);
     if (max_component(weight) > 0.0) {
       Lit lit = lit_at(froxel_place(gl_FragCoord.xy, ray.before + t));
       float share = 1.0 / max(lit.known, 1e-30);

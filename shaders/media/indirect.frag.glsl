@@ -373,7 +373,7 @@ Start start_at(vec3 position, vec3 onwards)
 }
 
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
-Start on_ray(ViewRay ray, int asks, int number, vec2 ask_turn, float v, inout uint seed)
+Start on_ray(ivec2 pixel, ViewRay ray, int asks, int number, vec2 ask_turn, float v, inout uint seed)
 {
   media_asked_by(asks);
   media_bins(ray.origin, ray.direction, ray.limit, seed);
@@ -399,7 +399,7 @@ Start on_ray(ViewRay ray, int asks, int number, vec2 ask_turn, float v, inout ui
     start.stop.position += t * ray.direction;
     start.stop.inside = bins.media[k];
     start.stop.lobe = media_lobe(start.stop.inside, start.stop.position, seed);
-    start.weight = bin_passing(k, t) / max(density, 1e-30);
+    start.weight = layers_before(pixel, t) * bin_passing(k, t) / max(density, 1e-30);
   }
   return start;
 }
@@ -480,7 +480,7 @@ void main()
 #endif
     vec2 ask_turn = vec2(media_random(seed), media_random(seed));
 #if !defined(FROM_SURFACES) && !defined(FROM_FROXELS)
-    Start start = on_ray(ray, asks, number, ask_turn, shuffled(turn, salt.yz), seed);
+    Start start = on_ray(pixel, ray, asks, number, ask_turn, shuffled(turn, salt.yz), seed);
 #endif
     if (max_component(start.weight) > 0.0) {
       vec3 straight;

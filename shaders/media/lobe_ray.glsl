@@ -19,6 +19,12 @@ bool lobe_ray(ivec2 pixel, out ViewRay ray, out int asks)
   return code != 0;
 }
 
+// Of layers before a place on it: those that it has passed count for what it has met alone.
+vec3 layers_before(ivec2 pixel, float t)
+{
+  return vec3(1.0);
+}
+
 void show_nothing()
 {
   out_glossy_direct = vec4(0.0);

@@ -30,3 +30,14 @@ ViewRay view_ray(vec4 seen, vec2 place)
   ray.limit = max(ray.limit - ray.before, 0.0);
   return ray;
 }
+
+// Colour of layers before a place on it, at `t`: addon/surfaces/seen_layers.py.
+vec3 layers_before(ivec2 pixel, float t)
+{
+#ifdef HAS_VIEW_LAYERS
+  vec4 layers = view_layers_fetch(pixel);
+  return (t > layers.w) ? layers.rgb : vec3(1.0);
+#else
+  return vec3(1.0);
+#endif
+}

@@ -96,3 +96,28 @@ def test_glass_below_a_pane_shows_a_lamp_in_its_colour(stage):
     clear, coloured = found
     assert clear.min() > 1e-3
     assert coloured / clear == pytest.approx(np.array(COLOR), rel=0.03)
+
+
+@pytest.mark.parametrize("samples", [1, 8])
+@pytest.mark.parametrize("panes", [1, 2])
+def test_fog_behind_a_pane_has_its_colour(stage, samples, panes):
+    """And what stands before it has not."""
+    found = []
+    for color in ((1, 1, 1), COLOR):
+        stage.clear()
+        stage.camera((0, -2.5, 0.5), (np.pi / 2, 0, 0), angle=0.6)
+        stage.floor(1.5, material=stage.diffuse(0.7))
+        for k in range(panes):
+            pane = stage.material("ShaderNodeBsdfTransparent", Color=(*color, 1))
+            stage.rectangle((0, -9), (9, 9), material=pane, location=(0, -1.5 + 0.1 * k, 0), turn=(np.pi / 2, 0, 0))
+        stage.light("SUN", (0, 0, 4), (0, 0, 0), energy=3.0, angle=0.0)
+        mist(stage)
+        passes = stage.render(samples, size=(24, 20), bounces=2)
+        found.append(np.array([passes[f"volume_{name}"][..., :3] for name in ("direct", "indirect")]))
+    # Filters of few samples bring a few thousandths of what is beside the panes this far.
+    clear, coloured = (np.array([one[:, :, :6].mean((1, 2)), one[:, :, 18:].mean((1, 2))]) for one in found)
+    assert clear.min() > 1e-4
+    assert coloured[0] == pytest.approx(clear[0], rel=0.05)
+    for order, bound in ((0, 0.02), (1, 0.15)):
+        share = coloured[1, order] / clear[1, order]
+        assert share == pytest.approx(np.array(COLOR) ** panes, rel=bound, abs=0.005)
