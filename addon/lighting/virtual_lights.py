@@ -16,7 +16,8 @@ have found y, so the density of candidates is the sum over all probes x:
 A candidate has the intensity L / n. `count` of them are kept by systematic resampling in proportion to L, cell by
 cell along a space-filling curve (after Georgiev & Slusallek 2010), so that one candidate more or less changes only
 what is kept nearby. Densities are traced for those kept alone. Surfaces have the picture's colours where the camera
-sees them, else their material's mean (reflectance.py), and a lobe of microfacets towards the probe that found them.
+sees them, else their material's mean (reflectance.py), and a lobe of microfacets towards the probe that found them; of
+smooth metal that lobe has direct light alone (near.glsl has the rest).
 
 | cost | per sample, with P = 192 probes and N virtual lights |
 |---|---|

@@ -43,6 +43,7 @@ REFLECTANCE = passes.fullscreen_program(
 # For programs that read the image where a technique brings what mirrors and glass throw on diffuse surfaces.
 MIRRORS_OWNED = (("MIRRORS_OWNED", "1"),)
 TURNED = (("TURNED_NORMALS", "1"),)  # where a material turns normals
+MIRRORS = (("SMOOTH_MIRRORS", "1"),)  # where a material is smooth metal
 TURNING = ("ShaderNodeNormalMap", "ShaderNodeBump")
 
 
@@ -57,7 +58,8 @@ class Reflectance:
         """Draw anew the materials that have changed or whose surfaces have."""
         self._update(frame)
         owned = MIRRORS_OWNED if frame.plan.owns(LIGHT_SPECULAR_DIFFUSE) else ()
-        self.image.defines = (*owned, *(TURNED if _turns_normals(frame) else ()))
+        mirrors = MIRRORS if any(smooth_metal(frame, k) for k in frame.snapshot.used_materials) else ()
+        self.image.defines = (*owned, *mirrors, *(TURNED if _turns_normals(frame) else ()))
 
     def _update(self, frame: Frame) -> None:
         keys = keys_of(frame)
@@ -112,9 +114,11 @@ class Reflectance:
 
 def _throws_caustics(frame: Frame, material: int) -> bool:
     """As lighting/caustic_casters.py has it: polish over another surface does not, however dark that is."""
-    graph = frame.snapshot.materials[material].graph
-    smooth = min(gloss.mirrors(graph), default=1.0) <= gloss.SMOOTH
-    return smooth or frame.materials.compiled[material].glass is not None
+    return smooth_metal(frame, material) or frame.materials.compiled[material].glass is not None
+
+
+def smooth_metal(frame: Frame, material: int) -> bool:
+    return min(gloss.mirrors(frame.snapshot.materials[material].graph), default=1.0) <= gloss.SMOOTH
 
 
 def keys_of(frame: Frame) -> dict[int, object]:

@@ -15,7 +15,8 @@ samples it shrinks with the spacing of the virtual lights.
 Each pixel evaluates every second virtual light, in a chequered pattern that changes with each sample, and traces `rays`
 of them, drawn in proportion to what they would bring: noise comes from visibility alone. Pixels choose all lights
 before they trace, so that neighbouring rays run together. Glossy surfaces trace a ray of their lobe, metals LOBE_RAYS
-of them; sheen, toon and translucent lobes one of the cosine's density.
+of them; sheen, toon and translucent lobes one of the cosine's density. Where a material is smooth metal, rays have no
+bound: what metal mirrors of other surfaces comes along them alone, followed over up to `bounces` mirrors.
 
 | cost | per sample |
 |---|---|

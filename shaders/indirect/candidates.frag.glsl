@@ -35,6 +35,7 @@ void main()
   vec3 later = vec3(0.0);
   vec3 later_shorter = vec3(0.0);
   vec3 throughput = vec3(1.0);
+  bool mirrored = false;  // the path goes on by a mirror
   // The first surface and the next ones by the same calls: compilers hold the code of each.
   for (int bounce = 1; bounce <= max(bounces, 1) && max_component(throughput) > 1e-4; bounce++) {
     if (bounce > 1) {
@@ -44,10 +45,15 @@ void main()
       vec3 reflected = PI * reflection_of(met.reflection, met.lit, onward, -direction);
       vec3 diffuse = even_share(met) * met.reflection.diffuse;
       // Neighbours share the next surfaces as the cosine finds them; those after follow the lobe.
-      for (bool further = bounce > 2; further; further = false) {
+      for (bool further = bounce > 2 && !mirrored; further; further = false) {
         onward = reflection_sample(met.reflection, met.lit, -direction, u, reflected);
       }
       reflected *= even_share(met);
+#ifdef SMOOTH_MIRRORS
+      for (; mirrored; mirrored = false) {
+        onward = mirror_sample(met, -direction, u, reflected);
+      }
+#endif
       if (bounce == 2) {
         // What neighbours share is the part below albedo: rough surfaces reflect less than that to most directions.
         lobe = max(reflected - diffuse, vec3(0.0));
@@ -93,8 +99,17 @@ void main()
       met.photons = false;  // they bring what a mirror sends to the picture, not to other surfaces
 #endif
     }
+#ifdef SMOOTH_MIRRORS
+    mirrored = bounce > 1 && mirror_drawn(met, -direction, to_unit(hash3(roll).y));
+#endif
     vec3 sent = direct_reflected(met, -direction, (bounce == 1) ? 4 : 1, roll.x);
     if (bounce == 1) {
+#ifdef SMOOTH_MIRRORS
+      if (met.mirror_alpha >= 0.0) {
+        // Rays of the picture's surfaces find what metal mirrors of other surfaces (indirect/near.glsl).
+        met.reflection.straight = met.reflection.grazing = vec3(0.0);
+      }
+#endif
       radiance = sent;
       shorter = (bounces > 1) ? sent : vec3(0.0);
     }

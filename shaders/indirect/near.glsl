@@ -1,7 +1,8 @@
 // What surfaces send along rays, of light that virtual lights leave to rays and of all.
 //
 // Virtual lights are bounded where they are near: one at distance d counts min(1, d2 / r2) of its light, a ray that meets a
-// surface at distance d counts 1 - min(1, d2 / r2) of what that sends. A program that includes this has the constants
+// surface at distance d counts 1 - min(1, d2 / r2) of what that sends. What smooth metal mirrors of other surfaces virtual
+// lights do not send (indirect/candidates.frag.glsl): rays meet that at any distance, and go on over the mirror. A program that includes this has the constants
 // `virtual_count`, `near_radius`, `glossy_radius` and `deeper` besides those of indirect/path.glsl.
 #include "indirect/path.glsl"
 #include "indirect/lights.glsl"
@@ -27,37 +28,65 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
   reach *= none ? sqrt(float(virtual_count)) : 1.0;
   vec3 sum = vec3(0.0);
   vec3 throughput = vec3(1.0);
+  bool from_seen = walk.bounce == 1 && !walk.whole;  // from a surface of the picture, over smooth metal alone
+  bool farther = false;                              // a surface has sent light along the walk by virtual lights
   for (; walk.bounce <= bounces; walk.bounce++) {
+    float share = 1.0;
+    bool mirrored = false;
     if (!walk.has_met) {
       float t;
-      if (!trace_vertex(walk.origin, walk.direction, walk.whole ? 1e29 : reach, roll.z, walk.met, t)) {
+#ifdef SMOOTH_MIRRORS
+      bool all = true;
+#else
+      bool all = walk.whole;
+#endif
+      if (!trace_vertex(walk.origin, walk.direction, all ? 1e29 : reach, roll.z, walk.met, t)) {
         break;
       }
-      throughput *= walk.whole ? 1.0 : 1.0 - t * t / (reach * reach);
+      share = walk.whole ? 1.0 : max(1.0 - t * t / (reach * reach), 0.0);
       throughput *= walk.met.passed;
       throughput *= passing_media(walk.origin, walk.direction, t, roll.y);
-      if (max_component(throughput) <= 1e-4) {
+#ifdef SMOOTH_MIRRORS
+      mirrored = mirror_drawn(walk.met, -walk.direction, to_unit(hash3(roll).y));
+#endif
+      if (max_component(throughput) * (mirrored ? 1.0 : share) <= 1e-4) {
         break;
       }
     }
 #ifdef MIRRORS_OWNED
     // Photons bring what a mirror sends to a diffuse surface of the picture, and to no other.
-    walk.met.photons = walk.met.photons && walk.bounce == 1 && !walk.whole;
+    walk.met.photons = walk.met.photons && from_seen;
 #endif
-    walk.whole = walk.has_met = false;
+    walk.has_met = false;
+    walk.whole = mirrored;
     roll = hash3(roll);
-    sum += throughput * direct_reflected(walk.met, -walk.direction, 1, roll.x);
+    if (share > 0.0) {
+      sum += throughput * share * direct_reflected(walk.met, -walk.direction, 1, roll.x);
+    }
+#ifdef SMOOTH_MIRRORS
+    if (mirrored) {
+      roll = hash3(roll);
+      vec3 reflected;
+      walk.direction = mirror_sample(walk.met, -walk.direction, vec2(to_unit(roll.x), to_unit(roll.y)), reflected);
+      throughput *= reflected;
+      walk.origin = ray_origin(walk.met.position, walk.met.normal);
+      continue;
+    }
+#endif
+    throughput *= share;
     if (walk.bounce < bounces) {
       vec3 from;
       vec3 arriving = virtual_irradiance(lit_position(walk.met), walk.met.lit, reach, walk.bounce > 0, roll.z, from);
       sum += throughput * even_share(walk.met) * arriving * reflection_of(walk.met.reflection, walk.met.lit, from, -walk.direction);
     }
-    if (walk.bounce == 1) {
+    if (walk.bounce > 0 && !farther) {
       if (deeper <= 0.0) {
         break;
       }
       throughput *= deeper;
+      farther = true;
     }
+    from_seen = walk.bounce == 0;
     roll = hash3(roll);
     vec3 reflected;
     vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));

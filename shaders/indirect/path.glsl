@@ -9,10 +9,10 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
+#include "indirect/mirror_color.glsl"
 #include "ask/media.glsl"
 #include "ask/leaving.glsl"
 
-#define REFLECTANCE_BANDS 9  // see indirect/reflectance.frag.glsl
 #define LAYERS_PASSED 16     // surfaces that a ray to a light goes through that they do not block
 
 struct Vertex {
@@ -32,6 +32,13 @@ struct Vertex {
 #endif
 #ifdef MIRRORS_OWNED
   bool photons;  // lamps' light that it mirrors arrives as photons of caustics
+#endif
+#ifdef SMOOTH_MIRRORS
+  // Of smooth metal: the lobe's own alpha (that of `reflection` is wider), below 0 elsewhere; the interpolated normal; and
+  // what of the lobe in `reflection` is its own.
+  float mirror_alpha;
+  vec3 mirror_normal;
+  vec3 mirror_share;
 #endif
 };
 
@@ -130,6 +137,67 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal, out vec3 turned,
   return mean_reflection(hit);
 }
 
+#ifdef SMOOTH_MIRRORS
+// Whether a ray that meets this has met smooth metal, and how it mirrors.
+void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
+{
+  int material = triangle_material(hit);
+  float code = reflectance_fetch(ivec2(material & 15, material >> 4)).a;
+  bool mirrors = code > 0.5 && max_component(met.reflection.grazing) > 0.0;
+  met.mirror_alpha = -1.0;
+  met.mirror_normal = met.normal;
+  met.mirror_share = vec3(0.0);
+  // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+  for (; mirrors; mirrors = false) {
+    met.mirror_alpha = max(code - 1.0, 0.0);
+    met.mirror_share = mirror_scale(material);
+    vec3 smooth_normal = triangle_shading_normal(hit, met.position);
+    smooth_normal = (dot(smooth_normal, met.normal) < 0.0) ? -smooth_normal : smooth_normal;
+    met.mirror_normal = (dot(smooth_normal, direction) < 0.0) ? smooth_normal : met.normal;
+  }
+}
+
+// What smooth metal reflects of what comes from where it mirrors `viewer`.
+vec3 mirror_reflectance(Vertex met, float cosine)
+{
+  float rise = pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0);
+  return met.mirror_share * mix(met.reflection.straight, met.reflection.grazing, rise);
+}
+
+// Where smooth metal mirrors a `viewer`; `weight`: what it reflects of light from there.
+vec3 mirror_sample(Vertex met, vec3 viewer, vec2 u, out vec3 weight)
+{
+  vec3 tangent;
+  vec3 bitangent;
+  vec2 alpha = vec2(met.mirror_alpha);
+  orthonormal_basis(met.mirror_normal, tangent, bitangent);
+  vec3 view = vec3(dot(tangent, viewer), dot(bitangent, viewer), max(dot(met.mirror_normal, viewer), 1e-4));
+  vec3 facet = (met.mirror_alpha > 1e-4) ? visible_normal(view, alpha, u) : vec3(0.0, 0.0, 1.0);
+  facet = facet.x * tangent + facet.y * bitangent + facet.z * met.mirror_normal;
+  weight = mirror_reflectance(met, dot(viewer, facet));
+  vec3 direction = safe_normalize(2.0 * dot(viewer, facet) * facet - viewer);
+  weight = (dot(direction, met.normal) > 0.0) ? weight : vec3(0.0);
+  return direction;
+}
+
+// Whether a path goes on by the mirror of what it has met, drawn by how much of what that reflects the mirror has. What
+// remains of its reflection is the way drawn, over the chance of that.
+bool mirror_drawn(inout Vertex met, vec3 viewer, float u)
+{
+  if (met.mirror_alpha < 0.0) {
+    return false;
+  }
+  float mirrored = luminance(mirror_reflectance(met, dot(met.mirror_normal, viewer)));
+  float chance = mirrored / max(mirrored + luminance(met.reflection.diffuse), 1e-30);
+  bool drawn = u < chance;
+  float scale = 1.0 / max(drawn ? chance : 1.0 - chance, 1e-6);
+  met.reflection.diffuse *= drawn ? 0.0 : scale;
+  met.reflection.straight *= drawn ? scale : 0.0;
+  met.reflection.grazing *= drawn ? scale : 0.0;
+  return drawn;
+}
+#endif
+
 // The surface that a ray meets before `limit`; false if none.
 bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Vertex met, out float t)
 {
@@ -151,6 +219,9 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
 #ifdef MIRRORS_OWNED
   int material = triangle_material(hit);
   met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
+#endif
+#ifdef SMOOTH_MIRRORS
+  mirror_met(met, hit, direction);
 #endif
   vec3 part;
   vec3 same;

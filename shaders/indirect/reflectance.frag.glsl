@@ -7,14 +7,15 @@
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
 
-// 1: a smooth mirror of a material that throws caustics (`mirrors`) or glass, whose light photons bring where a technique
-// owns it.
+// 1 for glass, 1 + alpha for a smooth mirror of a material that throws caustics (`mirrors`): photons bring their light where
+// a technique owns it.
 float mirrors_photons(Surface s, Reflection r)
 {
   bool glass = s.kind == LOBE_REFRACTION;
   bool mirror = mirrors != 0 && s.kind < LOBE_REFRACTION && luminance(r.grazing) > 0.0 && s.glossy_roughness <= SMOOTH_MIRROR
                 && luminance(r.straight) >= luminance(r.diffuse);
-  return (glass || mirror) ? 1.0 : 0.0;
+  vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
+  return mirror ? 1.0 + sqrt(alpha.x * alpha.y) : glass ? 1.0 : 0.0;
 }
 
 void main()

@@ -256,6 +256,9 @@ void main()
 #ifdef MIRRORS_OWNED
       rest.met.photons = false;
 #endif
+#ifdef SMOOTH_MIRRORS
+      rest.met.mirror_alpha = -1.0;
+#endif
       out_indirect.rgb += throughput * radiance_along(rest, glossy_radius, roll);
       break;
     }

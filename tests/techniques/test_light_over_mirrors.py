@@ -1,0 +1,109 @@
+"""Diffuse light that arrives by way of smooth metal (floor, mirror, floor), against Cycles' diffuse indirect pass.
+
+Lamps are wide enough for Cycles to find them in the metal. The `dark` half of a
+picture is that of its blocks to which Cycles brings less than the median.
+"""
+
+import bpy
+import numpy as np
+import pytest
+
+SIZE, BOUNCES = (48, 36), 8
+
+
+def aimed(stage, place, target, angle, radius=0.2, energy=400.0):
+    """A spot of `angle`, rad, at `place` that shines at `target`."""
+    way = np.subtract(target, place)
+    turn = (0.0, np.arctan2(np.hypot(way[0], way[1]), -way[2]), np.arctan2(way[1], way[0]) + np.pi)
+    return stage.light(
+        "SPOT", place, turn, energy=energy, spot_size=angle, spot_blend=0.2, shadow_soft_size=radius
+    )  # fmt: skip
+
+
+def ground(stage):
+    stage.rectangle((-3, -3), (3, 3), material=stage.diffuse(0.6))
+    stage.camera((0, -5.5, 4.2), (0.92, 0, 0), angle=0.7)
+
+
+def polish(stage, tint=0.9, roughness=0.05):
+    return stage.material("ShaderNodeBsdfAnisotropic", Color=(tint, tint, tint, 1), Roughness=roughness)
+
+
+def ceiling(stage):
+    """Above a floor whose middle alone is lit."""
+    ground(stage)
+    stage.rectangle((-3, -3), (3, 3), z=2.0, material=polish(stage)).visible_camera = False
+    aimed(stage, (0, 0, 1.5), (0, 0, 0), 0.9)
+
+
+def wall(stage):
+    """An upright mirror sends the floor's light to the rough wall that faces it, and none back to the floor."""
+    ground(stage)
+    upright(stage, 1.5, polish(stage))
+    upright(stage, -1.2, stage.diffuse(0.6))
+    aimed(stage, (0.4, 0, 2.0), (0.2, 0, 0), 0.9)
+
+
+def upright(stage, x, material):
+    stage.mesh([(x, -2, 0), (x, 2, 0), (x, 2, 1.6), (x, -2, 1.6)], [(0, 1, 2, 3)], material=material)
+
+
+def ball(stage, place=(-1.5, 0, 2.2), target=(-1.3, 0, 0), angle=0.55, **lamp):
+    """Beside the lit floor; nothing lights the ball itself."""
+    ground(stage)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.6, location=(0, 0, 0.6))
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.data.materials.append(polish(stage))
+    aimed(stage, place, target, angle, **lamp)
+
+
+def lit_ball(stage):
+    """A lamp so wide that Cycles finds it in the ball, too: what photons bring, and floor, ball, floor."""
+    ball(stage, (-1.8, 0.5, 2.2), (0, 0, 0.2), 1.5, radius=0.8)
+
+
+def ring(stage, place=(0, 0, 2.0), target=(0, 0, 0), angle=0.5, **lamp):
+    """A band that leans inwards, about the lit floor."""
+    ground(stage)
+    bpy.ops.mesh.primitive_cone_add(
+        vertices=96, radius1=1.0, radius2=0.75, depth=0.6, end_fill_type="NOTHING", location=(0, 0, 0.3)
+    )
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.data.materials.append(polish(stage))
+    aimed(stage, place, target, angle, **lamp)
+
+
+def lit_ring(stage):
+    """Its shadow lies over half of what it encloses."""
+    ring(stage, (-1.8, 0, 2.0), (0, 0, 0), 1.4, radius=0.8)
+
+
+SCENES = {
+    "ceiling": ceiling, "wall": wall, "ball": ball, "lit ball": lit_ball, "ring": ring, "lit ring": lit_ring,
+}  # fmt: skip
+
+
+def diffuse_indirect(stage, engine, samples, seed=1):
+    """Means of blocks of 4 x 4 pixels."""
+    stage.scene.candela.use_denoise = False  # it spreads light over the pixels of so small a picture
+    light = stage.render(samples, SIZE, seed, engine, bounces=BOUNCES)["diffuse_indirect"][..., :3].mean(axis=2)
+    return light.reshape(SIZE[1] // 4, 4, SIZE[0] // 4, 4).mean(axis=(1, 3))
+
+
+def test_an_upright_mirror_sends_no_light_of_a_floor_back_to_it(stage):
+    ground(stage)
+    upright(stage, 1.0, polish(stage, roughness=0.0))
+    aimed(stage, (0, 0, 2.0), (0, 0, 0), 0.7)
+    assert diffuse_indirect(stage, "CANDELA", 4).max() < 1e-5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", SCENES)
+def test_light_by_way_of_mirrors_is_that_of_cycles(stage, scene):
+    """4096 samples of Cycles and 256 of Candela: means 1.003, 1.005, 1.000, .981, .980, 1.007."""
+    SCENES[scene](stage)
+    ours, theirs = diffuse_indirect(stage, "CANDELA", 64), diffuse_indirect(stage, "CYCLES", 1024)
+    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)
+    if scene != "lit ring":  # footprints of photons reach through its wall
+        dark = theirs < np.median(theirs[theirs > 0])
+        assert ours[dark].mean() == pytest.approx(theirs[dark].mean(), rel=0.08, abs=0.02 * theirs.mean())
