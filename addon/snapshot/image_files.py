@@ -68,6 +68,14 @@ def tile_path(path: str, number: int) -> str:
     return path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{index % 10 + 1}_v{index // 10 + 1}")
 
 
+def channels_of_bytes(head: bytes) -> int:
+    """Channels of a file that Blender holds as bytes, by its first 32 bytes: of PNG with 8 bits or fewer and of JPEG. 0
+    for any other."""
+    if head[:8] == b"\x89PNG\r\n\x1a\n" and len(head) > 25 and head[24] <= 8:
+        return {0: 1, 2: 3, 3: 4, 4: 2, 6: 4}.get(head[25], 0)
+    return 3 if head[:3] == b"\xff\xd8\xff" else 0
+
+
 def read_file(path: str, space: str) -> np.ndarray | None:
     """(H, W, channels) float32 as Blender stores it, bottom row first; None where there is no such image."""
     if not Path(path).is_file():

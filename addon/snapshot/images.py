@@ -22,7 +22,17 @@ from ..materials.estimate import srgb_decode
 from ..materials.ies import Profile, profile_pixels
 from ..materials.sky import Sky, working_sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
-from .image_files import frame_of, read_file, read_layer, scaled, sequence_path, tile_path, to_scene_linear, turn_movie
+from .image_files import (
+    channels_of_bytes,
+    frame_of,
+    read_file,
+    read_layer,
+    scaled,
+    sequence_path,
+    tile_path,
+    to_scene_linear,
+    turn_movie,
+)
 from .scene import Image, Note
 
 # Byte images in these colour spaces need no decoding; sRGB is decoded after filtering, as in Cycles.
@@ -31,6 +41,8 @@ PROFILES_FADE = bpy.app.version < (5, 0)  # see materials/ies.py
 # Cycles before Blender 5.1: bytes have straight alpha and floats premultiplied alpha, whatever their alpha mode says.
 BYTES_ARE_STRAIGHT = FLOATS_ARE_PREMULTIPLIED = bpy.app.version < (5, 1)
 LOOK_S = 5e-8  # between two looks at a file that is newer than its pixels, per number: some ten times what one takes
+STAND_IN = 8  # pixels a side of what stands in for an image; they vary, and so does their alpha
+HEAD = 64  # bytes of a file that say what it is
 MAGENTA = (1.0, 0.0, 1.0, 1.0)  # what Cycles shows for an image that is not there
 
 
@@ -50,6 +62,8 @@ class ImageTable:
         `user` (ImageUser) says which frame of a sequence is meant, and which pass of a multilayer file.
         """
         original = image.original or image
+        if self._cache.stands_in and (channels := byte_channels(original)):
+            return self._stand_in(whole_key(original.session_uid), original, channels)
         dropped = not original.has_data  # as by Reload: asking for anything then loads the file
         part = _part(original, user, self._frame)
         key = whole_key(original.session_uid) + (f" {part}" if part else "")
@@ -85,27 +99,19 @@ class ImageTable:
             self.images[key] = Image(key, 0, pixels, "LINEAR", "NONE", "IES")
         return key
 
+    def _stand_in(self, key: str, original, channels: int) -> str:
+        pixels = np.ones((STAND_IN, STAND_IN, 4), np.float32)
+        pixels[::2, :, : min(channels, 4)] = 0.25
+        shown, encoding, alpha, bits = _as_shown(original, None, pixels, False, False)
+        self.images[key] = Image(key, next_version(), shown, encoding, alpha, original.name, bits=bits)
+        return key
+
     def _read(self, key: str, original, part: Part, old: ImageEntry | None, loaded: bool) -> ImageEntry:
         """`loaded`: Blender has just read the file."""
         pixels, tiles, missing, notes = _pixels(original, part)
         # The state is taken after reading: asking for pixels makes Blender load the file.
         state = _state(original, part)
-        is_float = original.is_float or isinstance(part, Layer)
-        encoding = "LINEAR" if isinstance(part, Layer) else _encoding(original)
-        alpha = original.alpha_mode
-        if alpha in ("STRAIGHT", "PREMUL") and original.colorspace_settings.is_data:
-            alpha = "CHANNEL_PACKED"  # what is no colour is not covered by alpha
-        elif alpha in ("STRAIGHT", "PREMUL"):
-            kept = original.source != "GENERATED" and not BYTES_ARE_STRAIGHT
-            alpha = "PREMUL" if is_float else alpha if kept else "STRAIGHT"
-        turned = not missing and not isinstance(part, Layer) and _is_rec709(original)
-        if turned:
-            pixels, encoding = _turned(pixels, encoding), "LINEAR"
-        if encoding == "" and not missing:
-            turned = True
-            pixels, encoding = to_scene_linear(pixels, original.colorspace_settings.name), "LINEAR"
-        as_stored = not is_float and not turned
-        bits = 8 if as_stored else 32 if original.colorspace_settings.is_data else 16
+        pixels, encoding, alpha, bits = _as_shown(original, part, pixels, missing, original.is_float)
         same = (
             old is not None
             and (old.image.encoding, old.image.alpha_mode, old.image.tiles, old.image.bits)
@@ -121,6 +127,42 @@ class ImageTable:
         self.read += 1
         made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing, tiles, bits)
         return ImageEntry(made, state, notes)
+
+
+def _as_shown(original, part: Part, pixels: np.ndarray, missing: bool, is_float: bool) -> tuple:
+    """Pixels, encoding, alpha mode and bits of an Image; `is_float`: of what Blender holds of the file."""
+    encoding = "LINEAR" if isinstance(part, Layer) else _encoding(original, is_float)
+    turned = not missing and not isinstance(part, Layer) and _is_rec709(original, is_float)
+    is_float = is_float or isinstance(part, Layer)
+    alpha = original.alpha_mode
+    if alpha in ("STRAIGHT", "PREMUL") and original.colorspace_settings.is_data:
+        alpha = "CHANNEL_PACKED"  # what is no colour is not covered by alpha
+    elif alpha in ("STRAIGHT", "PREMUL"):
+        kept = original.source != "GENERATED" and not BYTES_ARE_STRAIGHT
+        alpha = "PREMUL" if is_float else alpha if kept else "STRAIGHT"
+    if turned:
+        pixels, encoding = _turned(pixels, encoding), "LINEAR"
+    if encoding == "" and not missing:
+        turned = True
+        pixels, encoding = to_scene_linear(pixels, original.colorspace_settings.name), "LINEAR"
+    as_stored = not is_float and not turned
+    return pixels, encoding, alpha, 8 if as_stored else 32 if original.colorspace_settings.is_data else 16
+
+
+def byte_channels(original) -> int:
+    """Channels of an image of bytes in one piece, as far as that is known without loading it; else 0."""
+    if original.type != "IMAGE" or original.source not in ("FILE", "GENERATED"):
+        return 0
+    if original.has_data:
+        return 0 if original.is_float else original.channels
+    packed = original.packed_file
+    try:
+        if packed is not None:
+            return channels_of_bytes(packed.data[:HEAD])
+        with Path(_path(original)).open("rb") as file:
+            return channels_of_bytes(file.read(HEAD))
+    except OSError:
+        return 0
 
 
 def _is_stale(entry: ImageEntry, state: tuple) -> bool:
@@ -265,18 +307,18 @@ def _four_channels(pixels: np.ndarray) -> np.ndarray:
     return full
 
 
-def _encoding(original) -> str:
+def _encoding(original, is_float: bool) -> str:
     """LINEAR, SRGB, or nothing where colours have to be converted before they are filtered, as in Cycles."""
     space = original.colorspace_settings.name
-    if original.is_float or original.colorspace_settings.is_data or space in _LINEAR_SPACES:
+    if is_float or original.colorspace_settings.is_data or space in _LINEAR_SPACES:
         return "LINEAR"
     return "SRGB" if space == "sRGB" else ""
 
 
-def _is_rec709(original) -> bool:
+def _is_rec709(original, is_float: bool) -> bool:
     """Whether the pixels are colours of Rec. 709 while others are wanted. Floats are what Blender made of them."""
     space = original.colorspace_settings.name
-    colours = not original.is_float and not original.colorspace_settings.is_data
+    colours = not is_float and not original.colorspace_settings.is_data
     return colours and not working_space.current().usual and space in ("sRGB", "Linear", "Linear Rec.709")
 
 

@@ -1,7 +1,8 @@
 """What is compiled before anybody looks: when this engine is chosen for a scene in a window, or a file is opened that
 has it, the other process (ahead.py) begins with what a 3D region would show if it were switched to Rendered.
 
-The scene is read once more for that, and in one go, so large ones are left alone.
+The scene is read once more for that, and in one go, so large ones are left alone. Programs do not depend on what images
+show: where there are large ones, others stand in for those of bytes, which are neither loaded nor handed over.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from ..film import catcher
 from ..snapshot import SnapshotCache, camera_of_view, take
 from ..snapshot.camera import panoramic_view
 from ..snapshot.hair import hair_systems, point_count
+from ..snapshot.images import byte_channels
 from ..ui import ENGINE
 from ..ui.properties import settings_of
 from ..ui.viewport_pass import shown_pass
@@ -23,7 +25,8 @@ from . import _ahead, _viewports, closes_eyes, compiles_ahead, hidden_in, looked
 
 SOON_S = 0.3  # Blender has evaluated the scene by then
 # Of a scene that is read for this: some tenths of a second. Objects are counted with instances, faces with modifiers.
-MOST_OBJECTS, MOST_FACES, MOST_PIXELS = 2000, 500_000, 1 << 24
+MOST_OBJECTS, MOST_FACES = 2000, 500_000
+MOST_PIXELS = 1 << 24  # of images; so many of those for which none can stand in
 HAIR = 8  # faces that take as long as a point of particle hair, each of which is asked of Blender
 UNKNOWN_PIXELS = 1 << 22  # of an image that is not loaded: to ask for its size would load it
 
@@ -82,7 +85,8 @@ def _shown_in(area, depsgraph):
     if looks_through is not None and looks_through.data.type == "PANO":
         camera = panoramic_view(camera, depsgraph.scene_eval, depsgraph, looks_through, size)
     hidden = hidden_in(space, closes_eyes(depsgraph.view_layer_eval.layer_collection))
-    seen = take(depsgraph, SnapshotCache(), *size, view=camera, shown=shown_in(space, hidden))
+    cache = SnapshotCache(stands_in=sum(map(_pixels, bpy.data.images)) > MOST_PIXELS)
+    seen = take(depsgraph, cache, *size, view=camera, shown=shown_in(space, hidden))
     chosen = shown_pass(space)
     shows = frozenset(chosen.images if chosen is not None else ())
     if seen.has_catchers:
@@ -108,7 +112,11 @@ def _is_large(depsgraph) -> bool:
             faces += len(data.polygons if kind == "MESH" else data.points)
             if kind == "MESH" and bpy.data.particles:
                 faces += HAIR * sum(map(point_count, hair_systems(instance.object, final=False)))
-    return objects > MOST_OBJECTS or faces > MOST_FACES or sum(map(_pixels, bpy.data.images)) > MOST_PIXELS
+    return objects > MOST_OBJECTS or faces > MOST_FACES or _has_large_images()
+
+
+def _has_large_images() -> bool:
+    return sum(_pixels(one) for one in bpy.data.images if not byte_channels(one)) > MOST_PIXELS
 
 
 def _pixels(image) -> int:

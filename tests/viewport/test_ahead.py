@@ -17,12 +17,15 @@ import pytest
 from addon.frame.run import Renderer
 from addon.gfx import device, images, library
 from addon.materials.graph import Graph, Node
+from addon.snapshot import SnapshotCache, take
 from addon.snapshot.scene import Image, Material
 from addon.surfaces import first_look
 from addon.techniques import make_registry
+from addon.ui.properties import settings_of
 from addon.viewport import ahead, ahead_worker, chosen
 from addon.viewport.ahead import DRAFT, FULL, Ahead, needs_of
 from tests.viewport.region import Region
+from tests.viewport.test_compiling import material_named
 
 
 class Slow:
@@ -335,17 +338,48 @@ def test_large_scenes_are_told_without_reading_them(scene, monkeypatch, tmp_path
         bounds.setattr(chosen, "MOST_OBJECTS", 15)  # 8 objects and 16 instances
         assert is_large()
     assert not is_large()
-    written = bpy.data.images.new("Written", 4, 4)
-    written.filepath_raw, written.file_format = str(tmp_path / "written.png"), "PNG"
+    written = bpy.data.images.new("Written", 4, 4, float_buffer=True)  # nothing stands in for floats
+    written.filepath_raw, written.file_format = str(tmp_path / "written.exr"), "OPEN_EXR"
     written.save()
     bpy.data.images.remove(written)
     for _ in range(chosen.MOST_PIXELS // chosen.UNKNOWN_PIXELS + 1):
-        image = bpy.data.images.load(str(tmp_path / "written.png"))
+        image = bpy.data.images.load(str(tmp_path / "written.exr"))
         image.use_fake_user = True
     assert is_large() and not any(one.has_data for one in bpy.data.images)
     for image in bpy.data.images:
         _ = image.size[0]  # loads it
     assert not is_large()
+
+
+@pytest.mark.parametrize("ending", ["PNG", "JPEG"])
+def test_images_of_bytes_are_neither_loaded_nor_too_many(scene, region, tmp_path, ending):
+    """What stands in for them needs the programs that they need."""
+    sockets = ("Base Color", "Roughness", "Metallic", "Emission Color", "Normal")
+    material = material_named("Textured")
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    for socket in (*sockets, "Alpha"):
+        written = bpy.data.images.new("Written", 16, 16, alpha=True)
+        written.pixels.foreach_set(np.random.default_rng(1).random(16 * 16 * 4, np.float32))
+        written.filepath_raw, written.file_format = str(tmp_path / f"{socket}.{ending.lower()}"), ending
+        written.save()
+        bpy.data.images.remove(written)
+        image = nodes.new("ShaderNodeTexImage")
+        image.image = bpy.data.images.load(str(tmp_path / f"{socket}.{ending.lower()}"))
+        links.new(image.outputs["Alpha" if socket == "Alpha" else "Color"], nodes["Principled BSDF"].inputs[socket])
+    bpy.data.objects["Cube"].data.materials.append(material)
+    depsgraph = region.depsgraph
+    assert not chosen._is_large(depsgraph)
+    foreseen = take(depsgraph, SnapshotCache(stands_in=True), 96, 64, view=region.camera)
+    assert len(foreseen.images) == 6 and not any(one.has_data for one in bpy.data.images)
+    real = take(depsgraph, SnapshotCache(), 96, 64, view=region.camera)
+    assert all(one.has_data for one in bpy.data.images if one.users)
+    settings, found = settings_of(scene, viewport=True), []
+    for seen in (foreseen, real):
+        renderer = Renderer(make_registry)
+        next(renderer.beginning(seen, settings))
+        found.append((ahead.digests_of(renderer, seen, settings), ahead._foreseen(seen, settings)))
+        renderer.release()
+    assert found[0] == found[1]
 
 
 def test_nothing_is_said_where_a_scene_cannot_be_read_ahead(scene, monkeypatch):
