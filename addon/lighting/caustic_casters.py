@@ -137,7 +137,7 @@ class Answered:
         self.casters: Casters | None = None
         self.known = False
         self.bright: BrightPart | None = None  # of the world
-        self.on_gloss = False  # rough glossy lobes get light of lamps and the world through clear glass as photons
+        self.on_gloss = False  # rough glossy lobes get light of lamps and the world by way of smooth glass as photons
 
 
 def of(frame: Frame) -> Casters | None:

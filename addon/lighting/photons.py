@@ -325,10 +325,10 @@ class Photons:
 
     def traced(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int,
-        on_gloss: bool = False,
+        on_gloss: int = 0,
     ) -> Iterator[Bundle]:  # fmt: skip
         """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next.
-        `on_gloss`: glossy lobes may take those that clear glass lets pass."""
+        `on_gloss`: glossy lobes take those that smooth glass lets pass (REFRACTED) and mirrors (REFLECTED), a sum."""
         target = self._target("_found", light.view.side, len(FOUND))
         patterned = self._patterned and REFRACTED in light.lobes
         if patterned:
@@ -346,7 +346,7 @@ class Photons:
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},
                 constants={
-                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": int(on_gloss)
+                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": on_gloss
                 },
             )  # fmt: skip
             yield self._bundle(frame, technique, target, light)

@@ -17,8 +17,9 @@ place of a mask's pyramid, and all photons kept with their weight in place of ro
 | passes | 2 of the grid, 1 instanced draw of it into the picture |
 | bytes | 20 x 16 per photon |
 
-Rough glossy lobes take photons of lamps and the world that clear glass has let pass, and rays of theirs leave those
-out: a ray finds a small lamp through glass so rarely that it is a bright dot (shaders/caustics/gloss.glsl).
+Rough glossy lobes take photons of lamps and the world that smooth glass has let pass or mirrored, and rays of theirs
+leave those out: a ray finds a small lamp by way of glass so rarely that it is a bright dot
+(shaders/caustics/gloss.glsl).
 
 Bias, in diffuse indirect: as photons.py says. Receivers reflect evenly by their albedo. Caustics seen in mirrors and
 through glass come from maps (lighting/caustic_maps.py).
@@ -43,6 +44,7 @@ from ..kernels import splats
 from ..lighting import caustic_casters
 from ..lighting.caustic_maps import SEEN, CausticMaps
 from ..lighting.kept_apart import KeptApart
+from ..lighting.light_views import REFLECTED, REFRACTED
 from ..lighting.path_sources import ShadedLobes
 from ..lighting.photons import FOOTPRINTS, PHOTONS, SPREAD_SIDE, LitView, Photons
 from ..materials import gloss
@@ -163,7 +165,7 @@ class ScreenSpacePhotons(Technique):
         # Rays of gloss leave out what photons bring it: of lamps whose light they take glass as opaque for.
         key, rayed = caustic_casters.key_of(light.emitter), frame.service(ShadedLobes) is not None
         known = not rayed or key == caustic_casters.WORLD or key in frame.kept(CausticMaps).lights
-        onto_gloss = on_gloss and known and key != caustic_casters.MESHES and _seen_through_glass(frame, light)
+        onto_gloss = _lobes_on_gloss(frame, light) if on_gloss and known and key != caustic_casters.MESHES else 0
         interfaces = frame.settings.get(self, "interfaces")
         for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, onto_gloss):
             yield
@@ -187,16 +189,20 @@ class ScreenSpacePhotons(Technique):
 
 
 def _on_gloss(snapshot: Snapshot, casters: caustic_casters.Casters | str) -> bool:
-    """Whether glossy lobes may take photons. None end on mirrors or glass, even where those have a rough lobe, too."""
-    if isinstance(casters, str) or not casters.refracting or not snapshot.film.caustics_refractive:
+    """Whether glossy lobes may take photons: both kinds of caustics are on. None end on mirrors or glass, even where
+    those have a rough lobe, too."""
+    film = snapshot.film
+    if isinstance(casters, str) or not casters.refracting:
+        return False
+    if not (film.caustics_refractive and film.caustics_reflective):
         return False
     rough = [*(max(gloss.mirrors(snapshot.materials[k].graph)) for k in casters.mirrors)]
     rough += [max(gloss.glass(snapshot.materials[k].graph), default=1.0) for k in casters.refracting]
     return may_be_glossy(snapshot) and max(rough) <= gloss.SMOOTH
 
 
-def _seen_through_glass(frame: Frame, light: LitView) -> bool:
-    """Whether rays of gloss that glass lets pass would find the light."""
-    if light.emitter.light is None:
-        return frame.snapshot.world.visibility.transmission
-    return light.emitter.light.visibility.transmission
+def _lobes_on_gloss(frame: Frame, light: LitView) -> int:
+    """Those of glass next to the light, REFRACTED and REFLECTED as a sum, by which rays of gloss would find it."""
+    of_light = light.emitter.light
+    visibility = frame.snapshot.world.visibility if of_light is None else of_light.visibility
+    return REFRACTED * visibility.transmission + REFLECTED * visibility.glossy

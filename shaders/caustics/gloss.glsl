@@ -1,5 +1,5 @@
-// Which glossy lobes of the picture take photons that clear glass has let pass: those rougher than mirrors, which throw caustics
-// themselves (addon/materials/gloss.py). Smoother ones see the light through the glass by rays of their own, which
+// Which glossy lobes of the picture take photons that smooth glass has let pass or mirrored: those rougher than mirrors,
+// which throw caustics themselves (addon/materials/gloss.py). Smoother ones see the light by rays of their own, which
 // find it well; rays of the others leave it out (hits/found.frag.glsl).
 #define GLOSS_TAKES_FROM 0.251  // roughness
 

@@ -142,7 +142,9 @@ void main()
     lobe_spread = lobe_is_mirror(lobe) ? 0.0 : lobe_width(sqrt(lobe.alpha.x * lobe.alpha.y), false, 1.0);
   }
   bool passes = bends;
-  bool clear = bends && photon_gloss != 0 && lobe_spread == 0.0;  // smooth glass next to the light, then glass alone, which mirrors from within
+  // Smooth glass next to the light, then glass alone, which mirrors from within or is smooth; `photon_gloss`: 1 where gloss
+  // sees the light through glass, 2 where it sees it mirrored.
+  bool clear = (photon_gloss & (bends ? 1 : 2)) != 0 && lobe_spread == 0.0 && (bends || surface_is_mirror_of_glass(s));
   if (passes != (dot(onward, geometric_normal) < 0.0)) {
     return;
   }
@@ -243,7 +245,7 @@ void main()
     if (passes != (dot(onward, geometric_normal) < 0.0)) {
       return;
     }
-    clear = clear && (passes || (is_glass && leaves));
+    clear = clear && is_glass && (passes || leaves || lobe_spread == 0.0);
     flux *= of_interface * weight * adjoint(came, onward, smooth_normal, geometric_normal);
     path = mod(path * 3.0 + (passes ? 1.0 : 2.0), PATHS);
   }

@@ -23,9 +23,9 @@ float thinned(float travelled, float further)
   return (travelled > 0.0) ? ratio * ratio : 1.0;
 }
 
-// What a ray finds before `limit` in lights and the world. `beyond`: behind glass that a lobe's ray has met, where samples
+// What a ray finds before `limit` in lights and the world. `beyond`: by way of glass that a lobe's ray has met, where samples
 // of lamps do not reach that glass blocks, nor (`glass_blocks`) points on emissive meshes, where x is 1, and directions of
-// the world of more luminance than y. `photons`: what samples do not reach there arrives as photons.
+// the world of more luminance than y. `photons`: that arrives as photons.
 vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, bool photons, float lobe_density, float travelled,
                  float limit, bool with_world)
 {
@@ -74,9 +74,10 @@ void main()
   // A transparent film has a hole where clear glass shows the world: in alpha, how large.
   bool hole = ray_number > 0 && met.w == 0.0 && path_is_clear(code);
   // Frosted glass has asked for lights itself, and has a density of its own.
-  bool beyond = path_is_bent(code) && path_mirrors(code) > 0 && travelled > 0.0;
+  bool behind = path_is_bent(code) && path_mirrors(code) > 0 && travelled > 0.0;
+  bool photons = path_has_photons(code) && ray_number > 0 && (behind || (!path_is_bent(code) && along.w == 0.0));
+  bool beyond = behind || photons;
   if (ray_number > 0) {
-    bool photons = beyond && path_has_photons(code);
     sum += light_found(start, along.xyz, path_is_bent(code), beyond, photons, along.w, travelled, limit, !hole);
   }
   if (met.w != 0.0 && along.w >= 0.0) {

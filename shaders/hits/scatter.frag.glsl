@@ -106,8 +106,10 @@ void main()
     s = found_by_rays ? mirror : s;
   }
   through = through && apart;
-  // Photons that glass mirrors from outside do not shine on gloss (caustics/photon.frag.glsl).
-  code += (has_photons && (s.kind == LOBE_REFRACTION || mirrors_within(s))) ? PATH_PHOTONS : 0;
+  // As in caustics/photon.frag.glsl: what rough glass or metal mirrors from outside does not shine on gloss.
+  bool as_photons = s.kind == LOBE_REFRACTION || mirrors_within(s)
+                    || (surface_is_mirror_of_glass(s) && lobe_is_mirror(lobe_begin(s, viewer)));
+  code += (has_photons && as_photons) ? PATH_PHOTONS : 0;
 #endif
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
   vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));

@@ -30,6 +30,9 @@
 #define BOTH_MOST 4.0        // the largest share
 #define BOTH_ROUGHNESS 0.6   // of glass that is kept so
 
+// What glass mirrors, kept as a lobe of its own, has this edge; other dielectrics white.
+#define GLASS_EDGE vec3(0.0)
+
 vec3 both_ways_edge(float share, bool colored)
 {
   float code = floor(clamp(share / BOTH_MOST, 0.0, 1.0) * BOTH_STEPS + 0.5);
@@ -119,7 +122,7 @@ struct Closures {
   int kind;               // of the lobe that is kept: FRESNEL_* or LOBE_*
   vec3 glossy_weight;     // multiplies the whole lobe
   vec3 glossy_tint;       // see FRESNEL_*
-  vec3 glossy_edge;       // F82 only
+  vec3 glossy_edge;       // of F82; of dielectrics: GLASS_EDGE
   float glossy_ior;
   float glossy_roughness; // alpha = roughness^2
   float glossy_anisotropy; // see lobe_alpha

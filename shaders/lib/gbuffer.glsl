@@ -301,12 +301,18 @@ Surface surface_mirrored(Surface s)
     float share = code * (BOTH_MOST / BOTH_STEPS);
     s.glossy_weight = share * ((s.glossy_edge.x > 0.82) ? vec3(max_component(s.glossy_weight)) : s.glossy_weight);
     s.kind = FRESNEL_DIELECTRIC;
-    s.glossy_edge = vec3(1.0);
+    s.glossy_edge = GLASS_EDGE;
 #ifdef HAS_SURFACE_EDIT
     s.edit *= float(s.edit_mirrored);
 #endif
   }
   return s;
+}
+
+// Whether the lobe is what glass mirrors, from either side.
+bool surface_is_mirror_of_glass(Surface s)
+{
+  return s.kind == FRESNEL_DIELECTRIC && s.glossy_edge.x < 0.5;
 }
 
 // The surface with its coat as its lobe, where it is coated.

@@ -389,7 +389,7 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
     vec3 lobe_scale = multiscatter_scale(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, mu);
     // What little glass mirrors is often the brightest in view: kept more often than its albedo asks for.
     float importance = max(color_luminance(mirrored), point.refracts ? LEAST_MIRRORED : 0.0);
-    closure_glossy(closures, scale * reflected / lobe_scale, importance, FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, 0.0,
+    closure_glossy(closures, scale * reflected / lobe_scale, importance, FRESNEL_DIELECTRIC, f0, GLASS_EDGE, ior, r, 0.0,
                    default_tangent(n), n);
   }
   vec3 color = scale * max(transmitted, vec3(0.0));

@@ -821,6 +821,23 @@ def test_gloss_shows_a_lamp_through_glass_that_bends_nothing_as_without_it(stage
     assert through[10:14, 10:14].mean() == pytest.approx(free[10:14, 10:14].mean(), rel=0.06)
 
 
+@pytest.mark.slow
+def test_gloss_shows_a_lamp_by_way_of_glass_without_dots(stage):
+    """What a ball mirrors of a small lamp onto rough metal, and what leaves it again after reflections within, comes as
+    photons: rays of the metal's lobe, of which one in a thousand finds the lamp, leave that out."""
+    gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=0.4, Color=(1, 1, 1, 1))
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
+    ball(stage, glass(stage), place=(0, 0.9, 0.6), segments=48)
+    stage.light("POINT", location=(0.6, -0.9, 1.2), energy=100, shadow_soft_size=0.2)
+    stage.camera_above(1.2)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    stage.scene.candela.use_denoise = False
+    found = stage.render(16, (24, 24), bounces=4)["glossy_indirect"][..., 0]
+    truth = stage.render(4096, (24, 24), engine="CYCLES", bounces=4)["glossy_indirect"][..., 0]
+    assert found.sum() == pytest.approx(truth.sum(), rel=0.05)
+    assert np.square(found - truth).sum() < 2.0 * np.square(truth).sum()  # by rays 113
+
+
 def test_gloss_does_not_take_photons_of_a_lamp_that_rays_do_not_see_through_glass(stage):
     gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=0.5, Color=(1, 1, 1, 1))
     stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
