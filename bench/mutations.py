@@ -12,7 +12,9 @@ The test that fails must pass without the wrong, where it is run alone: one that
 go to out/mutations.json, as far as they came. `--drawn N` takes wrongs drawn at random instead of the list, and tells
 the share that is noticed by room. What was drawn and how it was judged is kept in bench/results, by the line of code
 that each stands in, so that a draw stays what it is where files are added: a run goes on where the last one ended,
-draws others for those whose line is gone, and with `--again` judges anew what was not noticed.
+draws others for those whose line is gone, and with `--again` judges anew what was not noticed. Of one that was looked
+at and changes nothing, or makes another noise of the same mean, `--equivalent NAME --reason TEXT` keeps why; it is
+judged no more and counts in no share.
 """
 
 from __future__ import annotations
@@ -174,6 +176,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="files of tests for each wrong that is drawn, the nearest first",
     )  # fmt: skip
     parser.add_argument("--again", action="store_true", help="of those that were drawn, judge survivors anew")
+    parser.add_argument("--equivalent", metavar="NAME", help="of those that were drawn, one that nothing can notice")
+    parser.add_argument("--reason", metavar="TEXT", help="with --equivalent: why nothing can")
 
 
 def chosen(options: argparse.Namespace, kept: dict[str, dict]) -> list[Mutation]:
@@ -243,6 +247,13 @@ def command(options: argparse.Namespace) -> int:
             print(f"{one.name:<52} {'stale' if is_stale(one) else '':<6} {one.file}")
         return 0
     results.parent.mkdir(exist_ok=True)
+    if options.equivalent:
+        if not options.reason or options.equivalent not in before:
+            print("A reason and the whole name of one that was drawn are needed, as --list prints it.")
+            return 2
+        before[options.equivalent] |= {"state": EQUIVALENT, "by": options.reason}
+        write_whole(results, json.dumps(before, indent=1, ensure_ascii=False) + "\n")
+        return 0
     if options.drawn:
         for one in wanted:
             before.setdefault(one.name, {"state": NOT_JUDGED, "by": "", **_place_in_line(one)})
@@ -252,7 +263,7 @@ def command(options: argparse.Namespace) -> int:
         for one in wanted:
             started = time.monotonic()
             known = before[one.name]["state"] if options.drawn else NOT_JUDGED
-            if known != NOT_JUDGED and not (options.again and known != KILLED):
+            if known != NOT_JUDGED and not (options.again and known not in (KILLED, EQUIVALENT)):
                 continue
             if options.drawn:
                 files, fast = one.tests[: -len(drawn_mutations.FAST)], drawn_mutations.FAST

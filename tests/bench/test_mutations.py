@@ -1,5 +1,8 @@
 """The list of small wrongs, and what is said of each."""
 
+import argparse
+import json
+
 import pytest
 
 from bench import drawn_mutations, mutations
@@ -146,3 +149,29 @@ def test_a_draw_stays_what_it_is_where_files_are_added(monkeypatch, tmp_path):
 def test_signs_of_shifts_and_exponents_are_no_places(text, at):
     assert drawn_mutations._is_part_of_a_word(text, at)
     assert not drawn_mutations._is_part_of_a_word("a = b < c - d;", 6)
+
+
+def test_a_drawn_wrong_that_nothing_can_notice_keeps_its_reason_and_is_not_judged(monkeypatch, tmp_path, capsys):
+    kept = {
+        "a.py:1 constant 1.0 -> 1.05": {"state": SURVIVED, "by": "", "line": "a = 1.0", "column": 4},
+        "a.py:2 operator + -> -": {"state": KILLED, "by": "a test", "line": "b = a + a", "column": 6},
+    }
+    monkeypatch.setattr(mutations, "JUDGED", tmp_path)
+    monkeypatch.setattr(mutations, "ROOT", tmp_path)
+    monkeypatch.setattr(drawn_mutations, "tests_for", lambda file: ("tests",))
+    monkeypatch.setattr(drawn_mutations, "drawn", lambda count, seed: [])
+    monkeypatch.setattr(mutations, "copy_of_tree", lambda folder: None)
+    monkeypatch.setattr(mutations, "failing", lambda *_: pytest.fail("it was judged"))
+    (tmp_path / "a.py").write_text("a = 1.0\nb = a + a\n")
+    (tmp_path / "mutations_1.json").write_text(json.dumps(kept))
+
+    def run(*arguments):
+        parser = argparse.ArgumentParser()
+        mutations.add_options(parser)
+        return mutations.command(parser.parse_args(["--drawn", "2", *arguments]))
+
+    assert run("--equivalent", next(iter(kept))) == 2  # no reason
+    assert run("--equivalent", next(iter(kept)), "--reason", "nobody reads it") == 0
+    assert run("--again") == 0
+    assert "1 of 2 noticed, 1 equivalent" in capsys.readouterr().out
+    assert json.loads((tmp_path / "mutations_1.json").read_text())[next(iter(kept))]["by"] == "nobody reads it"

@@ -1,6 +1,7 @@
 """Functions of techniques' shaders by themselves, against closed forms."""
 
 import numpy as np
+import pytest
 
 from addon.film.resolve import resolve_program
 from addon.film.together import SUM
@@ -8,9 +9,12 @@ from addon.gfx import images, passes
 from addon.gfx.struct import Block
 from addon.lighting.caustic_maps import KEEP
 from addon.lighting.edge_tiles import EDGE_LIGHT
+from addon.lighting.imperfect_maps import PULL as PULL_MAP
+from addon.lighting.light_choice import Choice
 from addon.lighting.media_bounces import surfaces_program
 from addon.materials.energy import energy_texture
 from addon.scene.view import VIEW
+from addon.surfaces.scatter_means import MEANS
 from addon.techniques.multires_radiosity import PULL
 from tests.glsl import evaluated
 
@@ -357,3 +361,60 @@ def test_paths_leave_by_the_lobe_with_its_energy_and_never_far_too_bright(gpu_co
         exact = ((reflected * nl).mean(axis=1) * weights).sum() * np.pi  # half of 2 pi: nodes span 2
         np.testing.assert_allclose(found[k, 0], exact, rtol=0.01)
     assert found[:, 1].max() < 1.5 < 30.0 < found[:, 2].max()
+
+
+def test_a_map_of_half_the_side_has_the_nearest_of_four_planes_where_most_lie_alike(gpu_context):
+    """A map of parallel rays: planes across them at these distances, in blocks of four texels."""
+
+    side, half = 4, 1.0  # to distances of a map of directions, 64 times its half side is added
+    block = np.arange(side * side).reshape(side, side)
+    z = np.repeat(np.repeat(64.0 + 3.0 + block, 2, axis=0), 2, axis=1)
+    z += np.tile([[0.05, 0.02], [0.03, 0.0]], (side, side))
+    z[-2:, -2:] = 64.0 + np.array([[5.0, 7.0], [5.05, 9.0]])  # two alike are too few
+    normal = evaluated("ism/paraboloid.glsl", "vec4(plane_pack(Plane(1.0, vec3(0, 0, 1), false)), 0.0, 0.0)", 2)[0, 1]
+    found = drawn(
+        PULL_MAP, {"finer_maps": np.stack([z, np.full_like(z, normal), 0 * z, 0 * z], axis=-1)}, (side, side),
+        constants={"map_side": side, "threshold": 0.1, "half_extent": half},
+    )[..., 0]  # fmt: skip
+    expected = 67.0 + block
+    expected[-1, -1] = 0.0
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_what_scatters_below_a_cell_of_pixels_is_its_mean_over_those_that_do(gpu_context):
+    """Two materials side by side, of 2 x 2 pixels each; in bands the length of the profile, its colour, the share."""
+    scatters = np.array([[1, 0, 1, 1], [1, 0, 1, 1]], bool)
+    length, share, walk = np.random.default_rng(2).random((3, 2, 4, 4))
+    length[..., 3] = 0.0
+    share[..., 3] = np.where(scatters, 4.0 * 3 + 2, 0.0)  # of object 3, by method 2
+    walk[..., 0], walk[..., 1] = 0.25, 1.4
+    found = drawn(MEANS, {"spread_length": length, "scatter_share": share, "scatter_walk": walk}, (2, 3), constants={
+        "extent": (2, 2), "rows": 1,
+    })  # fmt: skip
+    for column in range(2):
+        own = (slice(None), slice(2 * column, 2 * column + 2))
+        np.testing.assert_allclose(found[0, column], [*length[own][scatters[own]].mean(axis=0)[:3], 2.0], rtol=1e-5)
+        assert found[1, column, 3] == pytest.approx(0.25)
+        np.testing.assert_allclose(found[2, column], [*share[own][scatters[own]].mean(axis=0)[:3], 1.4], rtol=1e-5)
+
+
+def test_candidates_are_ordered_within_the_bounds_of_those_that_are_there_and_count_once(gpu_context):
+    """Six of which two are none, far away; of the others one sends nothing."""
+    points = np.zeros((2, 4, 4))
+    points[0] = [(1, 2, 3, 1), (1e6, 0, 0, 0), (-1, 0, 2, -1), (0, 5, -4, 1)]
+    points[1, :2] = [(0, -1e6, 1e6, 0), (2, 1, 1, 1)]
+    sends = np.array([[0.5, 9.0, 2.0, 0.0], [9.0, 3.0, 0.0, 0.0]])
+    choice = Choice(4, 6, (0.0, 0.0, 0.0, 1e9))
+    point, black = images.upload(points), images.upload(np.zeros((2, 4, 4)))
+    choice.order(point, images.upload(np.zeros((2, 4, 4))))
+    low, high = (images.read(one)[0, :, :3] for one in choice._held[:2])
+    assert low.min(axis=0).tolist() == [-1, 0, -4] and high.max(axis=0).tolist() == [2, 5, 3]
+    radiance = images.upload(np.repeat(sends[..., None], 4, axis=2))
+    choice.radiances(
+        {"candidate_point": point, "candidate_radiance": radiance, "candidate_albedo": black, "next_radiance": black},
+        None,
+    )
+    importance = images.read(choice.importance)[..., :2].reshape(-1, 2)
+    assert sorted(value for value in importance[:, 0] if value) == pytest.approx([0.5, 2.0, 3.0])
+    np.testing.assert_array_equal(importance[:, 1], importance[:, 0] > 0)
+    choice.release()
