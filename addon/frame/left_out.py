@@ -28,7 +28,8 @@ BRINGS = {
 }
 
 COLOURED = ("instant_radiosity", "multires_radiosity", "clustered_visibility")  # whose rays take colours of layers
-EVEN = ("micro_rendering", "implicit_visibility", "ssdo")  # for which gloss sends light on as dull surfaces do
+EVEN = ("implicit_visibility", "ssdo")  # for which gloss sends light on as dull surfaces do
+DIRECTED = "micro_rendering"  # sends what gloss throws of lamps by its direction
 GEM = 2.0  # index of refraction, from which on most directions are mirrored totally
 GEM_INTERFACES = 24  # crossings that such glass needs
 WIDE = 0.45  # roughness from which a lobe is about as wide as those of paths (shaders/indirect/albedo.glsl)
@@ -64,7 +65,7 @@ def _thrown_wide(
     plan: Plan, snapshot: Snapshot, settings: Settings, materials: Sequence[CompiledMaterial]
 ) -> Iterator[Note]:
     """Gloss that is narrower than the lobes of paths and no caustic: what it throws onto surfaces is blurred."""
-    if "indirect" not in plan.filled or settings.bounces <= 0:
+    if plan.filled.get("indirect", DIRECTED) == DIRECTED or settings.bounces <= 0:
         return
     least = gloss.SMOOTH if "caustics" in plan.filled else 0.0
     names = []

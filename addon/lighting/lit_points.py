@@ -3,24 +3,28 @@
 Whatever spreads points over surfaces (points by area: point_runs.py; surfels: surfels.py) has them shaded and lit here.
 Points are records of hits, known beforehand or found by rays; the material's own program is run at each
 (surfaces/hits.py): textures, procedurals and vertex colours of what no camera sees. What is kept is the share of even
-light that leaves again: gloss counts as diffuse, what it reflects of even light is right, its direction is not. Light
-of lamps, the world and emissive meshes comes from the light loop with traced shadows (point_light.py).
+light that leaves again. Gloss counts as diffuse there: what it reflects of even light is right, its direction is not.
+Who looks at directions has it kept apart (`directed`). Light of lamps, the world and emissive meshes comes from the
+light loop with traced shadows (point_light.py).
 
 | cost | |
 |---|---|
 | closures | 1 pass, and 1 for each material; 13 x 16 bytes a point while it runs, 3 x 16 are kept |
 | light | as point_light.py: 1 ray for each point and point of a light source in front of it |
 
-Bias: as surfaces/hits.py and point_light.py; a mirror sends light to all sides; light through glass does not arrive.
+Bias: as surfaces/hits.py and point_light.py; mirrors send light to all sides unless gloss is apart; light through glass
+does not arrive.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
+from ..materials import gloss
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
@@ -33,6 +37,13 @@ REFLECT = passes.fullscreen_program(
     textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_position"), ("VEC4", "out_normal"), ("VEC4", "out_albedo")),
+)
+# The diffuse part alone, the albedo of all, and that of gloss with its roughness in w (below 0: a mirror's).
+REFLECT_APART = replace(
+    REFLECT,
+    name="what points reflect, gloss apart",
+    defines=(*REFLECT.defines, ("GLOSS", "1"), ("SMOOTH_MIRROR", f"{gloss.SMOOTH + 1e-4:.4f}")),
+    outputs=tuple(("VEC4", f"out_{name}") for name in (*NAMES, "albedo", "gloss")),
 )
 PROGRAMS = (REFLECT, LIGHTING)
 
@@ -50,17 +61,20 @@ class LitPoints:
         self._light.begin(frame)
 
     def shade(
-        self, frame: Frame, technique: Technique, facing: images.Image, find: Callable[[Hits, Records], set[int]]
-    ) -> images.Target:
+        self, frame: Frame, technique: Technique, facing: images.Image, find: Callable[[Hits, Records], set[int]],
+        directed: bool = False,
+    ) -> images.Target:  # fmt: skip
         """Place, normals and albedo of points, images of the pool in the order of NAMES; position.w is 0 where there is
-        none. `facing`: the direction in which each is looked at; `find` fills in the records and returns the materials
+        none. `directed`: gloss apart, in the order of REFLECT_APART. `facing`: the direction in which each is looked
+        at; `find` fills in the records and returns the materials
         that may be there (Hits.trace, Hits.place)."""
         hits, records = frame.kept(Hits), Records.take(facing.size)
         closures = take_closures(facing.size, records.target.depth)
         hits.shade(frame, technique, facing, records, find(hits, records), closures)
-        shaded = images.Target(tuple(images.pool.take(*facing.size, "RGBA32F") for _ in NAMES))
+        program = REFLECT_APART if directed else REFLECT
+        shaded = images.Target(tuple(images.pool.take(*facing.size, "RGBA32F") for _ in program.outputs))
         passes.fullscreen(
-            REFLECT, shaded, blocks={"film_view": frame.view_block},
+            program, shaded, blocks={"film_view": frame.view_block},
             textures={**closure_bindings(closures), "energy_table": frame.materials.energy_table},
         )  # fmt: skip
         for image in closures.colors:
@@ -74,13 +88,14 @@ class LitPoints:
         number: int | None = None,
     ) -> None:  # fmt: skip
         """Add the direct light of this sample, or of sample `number`, that `count` points (images in the order of
-        NAMES) reflect to the first of the two images of `target`: radiance."""
+        NAMES) reflect to the first of the images of `target`: radiance. Of three images the others get what falls on
+        the points across its direction, and its ways (PointLight.add)."""
         if self._black is None or self._black.size != target.size:
             self._give()
             self._black = images.pool.take(*target.size, "RGBA32F")
             images.Target((self._black,)).clear()
         surfaces = dict(zip(NAMES, points)) | dict.fromkeys(("tint", "lobe", "emission"), self._black)
-        drawn, rays = self._light.add(frame, surfaces, target, number)
+        drawn, rays = self._light.add(frame, surfaces, target, number, photons=len(target.colors) > 2)
         frame.count(technique, "passes", drawn)
         frame.count(technique, "light rays", rays * count)
 

@@ -61,6 +61,9 @@ RAYS_WHERE_NEAR = Lookup(
 )
 
 
+OUTPUTS = (("VEC4", "out_diffuse"), ("VEC4", "out_glossy"))
+
+
 @cache
 def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
     """The lighting pass with the visibility of a technique, for scenes with or without soft lobes, and for lights of
@@ -83,7 +86,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
             ("LIGHT_KINDS", str(kinds)),
         ),
         snippets=source_of(lookup),
-        outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+        outputs=OUTPUTS,
     )
 
 

@@ -97,6 +97,13 @@ PULL_POINTS, PULL = (
     )
     for below, defines in (("points", (("FIRST", ""),)), ("nodes", ()))
 )
+LOBES = passes.fullscreen_program(
+    "light of gloss at points",
+    "micro/lobes.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in ("sent", "direct", "across", "ways", "gloss", "normal")),
+    outputs=tuple(("VEC4", f"out_{name}") for name in ("flux", "ways", "all")),
+)
+LOBE_TEXTURES = (("RGBA32F", "node_flux"), ("RGBA32F", "node_ways"))  # of programs that look at gloss by direction
 PROGRAMS = (CLIPS, OF_GROUPS, ARRIVING, SENT, SHARES, PULL_POINTS, PULL)
 
 
@@ -134,11 +141,18 @@ def buffer_bindings(frame: Frame, run: Run, side: int, threshold: float, centre_
 
 
 class NodeRadiance:
-    """Radiance of all nodes of a run's tree in this sample. A technique owns one."""
+    """Radiance of all nodes of a run's tree in this sample, and `lobes`, of what gloss sends by direction (flux and
+    ways, shaders/micro/lobes.frag.glsl), where the run has gloss apart. A technique owns one."""
 
     def __init__(self):
         self.image: images.Image | None = None
         self._spare: images.Image | None = None
+        self._of_lobes: list[images.Image] = []
+
+    @property
+    def lobes(self) -> dict[str, images.Image]:
+        """Textures by the names of LOBE_TEXTURES; none where there are none."""
+        return dict(zip((name for _, name in LOBE_TEXTURES), self._of_lobes))
 
     def update(
         self, frame: Frame, technique: Technique, points: PointRuns, run: Run, bounces: int, groups: int,
@@ -146,12 +160,17 @@ class NodeRadiance:
     ) -> Iterator[None]:  # fmt: skip
         """Direct light at the points, and what of it has been reflected up to `bounces` times, by `groups` groups."""
         leaves = run.tree.leaves
-        self._prepare(4 * leaves)
-        direct = points.light(frame, technique, run)
-        held = [direct, images.pool.take(*run.size, "RGBA32F")]
-        sent = held[1]
+        self._prepare(4 * leaves, run.directed)
+        lit = points.light(frame, technique, run)
+        direct = lit[0]
+        held = [images.pool.take(*run.size, "RGBA32F"), *lit]
+        sent = held[0]
         try:
             yield
+            if run.directed:
+                held += [images.pool.take(*run.size, "RGBA32F") for _ in LOBES.outputs]
+                every = self._send_lobes(frame, technique, run, lit, sent, held[-3:])
+                direct = every if bounces > 0 else direct
             self._send(frame, technique, run, direct, direct, direct, 0, sent)
             if bounces > 0:
                 groups = min(groups, leaves // 2)
@@ -186,7 +205,8 @@ class NodeRadiance:
                 program = ARRIVING if media is None else ARRIVING_IN_MEDIA
                 textures = {} if media is None else {"tree_nodes": run.nodes, **media.bindings}
                 constants |= {"group_count": groups}
-                for _ in range(bounces):
+                for bounce in range(bounces):
+                    direct = lit[0] if bounce == bounces - 1 else direct  # pixels see gloss by direction
                     passes.fullscreen(
                         program, images.Target((arriving,)),
                         textures={"micro": micro, "node_radiance": self.image, **textures},
@@ -199,35 +219,61 @@ class NodeRadiance:
                 images.pool.give(image)
 
     def _send(self, frame, technique, run: Run, direct, arriving, shares, groups: int, sent: images.Image) -> None:
-        leaves = run.tree.leaves
+        self._draw_sent(run, direct, arriving, shares, groups, sent)
+        self.image, drawn = self._pulled(run.tree.leaves, sent, self.image)
+        frame.count(technique, "passes", drawn + 1)
+
+    def _draw_sent(self, run: Run, direct, arriving, shares, groups: int, sent: images.Image) -> None:
         passes.fullscreen(
-            SENT, images.Target((sent,)), constants={"leaf_count": leaves, "group_count": groups},
+            SENT, images.Target((sent,)), constants={"leaf_count": run.tree.leaves, "group_count": groups},
             textures={
-                "tree_nodes": run.nodes, "direct": direct, "albedo": run.shaded.colors[2], "arriving": arriving,
+                "tree_nodes": run.nodes, "direct": direct, "albedo": run.albedo, "arriving": arriving,
                 "shares": shares,
             },
         )  # fmt: skip
+
+    def _send_lobes(self, frame, technique, run: Run, lit, sent: images.Image, into) -> images.Image:
+        """Flux and ways of all nodes, and direct light with gloss as of diffuse surfaces. `into`: images of LOBES."""
+        direct, across, ways = lit
+        self._draw_sent(run, direct, direct, direct, 0, sent)  # for the areas
+        passes.fullscreen(
+            LOBES, images.Target(tuple(into)),
+            textures={
+                "sent": sent, "direct": direct, "across": across, "ways": ways, "gloss": run.shaded.colors[4],
+                "normal": run.shaded.colors[1],
+            },
+        )  # fmt: skip
+        frame.count(technique, "passes", 2)
+        for k, image in enumerate(into[:2]):
+            self._of_lobes[k], drawn = self._pulled(run.tree.leaves, image, self._of_lobes[k])
+            frame.count(technique, "passes", drawn)
+        return into[2]
+
+    def _pulled(self, leaves: int, sent: images.Image, image: images.Image) -> tuple[images.Image, int]:
+        """Means of all nodes, in `image` or in the spare one, which takes its place; and how many passes."""
         level, program, source = leaves.bit_length() - 1, PULL_POINTS, sent
-        drawn = 1
+        drawn = 0
         while level > 0:
             passes.fullscreen(
                 program, images.Target((self._spare,)), textures={"sent": source},
                 constants={"leaf_count": leaves, "known_level": level},
             )  # fmt: skip
-            self.image, self._spare = self._spare, self.image
-            level, program, source = level - PULLED, PULL, self.image
+            image, self._spare = self._spare, image
+            level, program, source = level - PULLED, PULL, image
             drawn += 1
-        frame.count(technique, "passes", drawn)
+        return image, drawn
 
-    def _prepare(self, entries: int) -> None:
+    def _prepare(self, entries: int, directed: bool) -> None:
         height = max(-(-entries // images.LIST_WIDTH), 1)
-        if self.image is None or self.image.height != height:
+        if self.image is None or self.image.height != height or len(self._of_lobes) != 2 * directed:
             self.release()
-            self.image, self._spare = (images.pool.take(images.LIST_WIDTH, height, "RGBA32F") for _ in range(2))
+            self.image, self._spare, *self._of_lobes = (
+                images.pool.take(images.LIST_WIDTH, height, "RGBA32F") for _ in range(4 if directed else 2)
+            )
 
     def release(self) -> None:
         """Give images back."""
-        for image in (self.image, self._spare):
+        for image in (self.image, self._spare, *self._of_lobes):
             if image is not None:
                 images.pool.give(image)
-        self.image = self._spare = None
+        self.image, self._spare, self._of_lobes = None, None, []

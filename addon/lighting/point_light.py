@@ -27,7 +27,7 @@ from ..sources import lights
 from . import caustic_casters, linked
 from .asked import asked
 from .emissive_triangles import EmissiveTriangles
-from .loop import lighting
+from .loop import OUTPUTS, lighting
 from .visibility import RAYS, ray_bindings
 
 FEW_POINTS = 16  # on each lamp, of the world and of emissive meshes, in a picture of few samples
@@ -35,6 +35,12 @@ OTHER_POINTS = 4  # of the world and of emissive meshes, in each sample at least
 # With the colours of layers that rays pass; direct light of the picture has its coloured shadows by channel (loop.py).
 _BY_RAYS = lighting(RAYS, False)
 LIGHTING = replace(_BY_RAYS, name="light of points", defines=(*_BY_RAYS.defines, ("LAYERS", "1")))
+
+# With where mirrors at the points would send it, for targets of three images.
+LIGHTING_WITH_WAYS = replace(
+    LIGHTING, name="light of points and its ways", defines=(*LIGHTING.defines, ("WAYS", "1")),
+    outputs=(*OUTPUTS, ("VEC4", "out_ways")),
+)  # fmt: skip
 
 
 class PointLight:
@@ -70,9 +76,11 @@ class PointLight:
         instances: images.Image | None = None, without: frozenset[int] = frozenset(), photons: bool = False,
     ) -> tuple[int, int]:  # fmt: skip
         """Add this sample's diffuse and glossy direct light, or that of sample `number`, on `surfaces` (by the names of
-        SURFACE_IMAGES) to the two images of `target`. `instances`: of which instance each point is (z: its row in the
-        geometry's image), for lights that leave out objects. `without`: ids of lamps that are left out.
-        `photons`: what glass passes of light that photons answer for arrives with these. Returns the numbers of passes
+        SURFACE_IMAGES) to the two images of `target`. Of three, the second one gets what falls across its direction and
+        the third where mirrors would send it, by luminance. `instances`: of which instance each point is (z: its row in
+        the geometry's image), for lights that leave out objects. `without`: ids of lamps that are left out.
+        `photons`: what glass passes of light that photons answer for arrives with these; of a target of three, w of the
+        second says how much is of such light. Returns the numbers of passes
         and of rays a point."""
         number = frame.sample if number is None else number
         by_blockers: dict[frozenset[int], list[np.ndarray]] = {}  # that let light pass
@@ -82,7 +90,7 @@ class PointLight:
         rows = [row for some in by_blockers.values() for row in some]
         drawn = 0
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
-        program = asked(frame, LIGHTING, bound)
+        program = asked(frame, LIGHTING if len(target.colors) == 2 else LIGHTING_WITH_WAYS, bound)
         with ExitStack() as stack:
             if instances is not None and linked.has_links(rows):
                 groups = stack.enter_context(images.borrowed(instances.width, instances.height, "R32F"))

@@ -32,7 +32,7 @@ from ..scene.point_tree import PointTree, fitted
 from ..scene.seen import UNSEEN, seen_triangles
 from ..scene.view import VIEW
 from ..surfaces.hits import Hits, Records
-from .lit_points import LitPoints
+from .lit_points import NAMES, LitPoints
 
 ROW = 128  # entries of a row of images of points
 RUNS = 8
@@ -58,7 +58,7 @@ SHARPNESS = 64.0  # see PointLight: a bright spot is one of thousands of points 
 @dataclass
 class Run:
     """Points of one run on the GPU, and as a tree. `clips`: where on its piece light at a point holds; `shaded`: place,
-    normals and albedo of both sides of all."""
+    normals and albedo of both sides of all, and gloss apart where it is `directed` (lit_points.REFLECT_APART)."""
 
     points: AreaPoints
     tree: PointTree
@@ -74,6 +74,16 @@ class Run:
     def size(self) -> tuple[int, int]:
         """Of images of the points."""
         return ROW, 2 * self.tree.leaves // ROW
+
+    @property
+    def directed(self) -> bool:
+        """Whether gloss is apart."""
+        return len(self.shaded.colors) > len(NAMES)
+
+    @property
+    def albedo(self) -> images.Image:
+        """Of all that points reflect."""
+        return self.shaded.colors[len(NAMES) if self.directed else 2]
 
 
 class PointRuns:
@@ -130,14 +140,16 @@ class PointRuns:
             self._shade(frame, technique, run)
         return run
 
-    def light(self, frame: Frame, technique: Technique, run: Run) -> images.Image:
-        """What both sides of all points reflect of this sample's direct light: an image of the pool, radiance."""
-        direct, unused = (images.pool.take(*run.size, "RGBA32F") for _ in range(2))
-        target = images.Target((direct, unused))
+    def light(self, frame: Frame, technique: Technique, run: Run) -> tuple[images.Image, ...]:
+        """What both sides of all points reflect of this sample's direct light, images of the pool: radiance, and of a
+        run that is `directed` without gloss, then what falls across its direction, and its ways (PointLight.add)."""
+        target = images.Target(tuple(images.pool.take(*run.size, "RGBA32F") for _ in range(3 if run.directed else 2)))
         target.clear()
         self._lit.light(frame, technique, run.shaded.colors, target, 2 * run.tree.leaves)
-        images.pool.give(unused)
-        return direct
+        if run.directed:
+            return target.colors
+        images.pool.give(target.colors[1])
+        return target.colors[:1]
 
     def _placed(self, frame: Frame, points: AreaPoints) -> Run:
         """The run of these points, which are in the order of a tree's leaves."""
@@ -189,7 +201,7 @@ class PointRuns:
             hits.place(frame, technique, run.own, records)
             return run.materials
 
-        run.shaded = self._lit.shade(frame, technique, run.facing, place)
+        run.shaded = self._lit.shade(frame, technique, run.facing, place, frame.materials.glossy)
         frame.count(technique, "points shaded", 2 * run.tree.leaves)
 
     def _unshade(self, run: Run) -> None:

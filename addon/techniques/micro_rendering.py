@@ -8,6 +8,10 @@ Pixels of the buffer are equal shares of what the surface reflects, so light is 
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
+Where materials are glossy, points and nodes also have what their gloss sends of direct light: one lobe of von Mises and
+Fisher each, about where mirrors would send it, as a mean direction and a flux, both of which average over a tree
+(shaders/micro/lobes.frag.glsl). Light that photons answer for is left out of mirrors.
+
 Diffuse light is gathered by regions of the picture and interpolated as in multires_radiosity.py; lobes of microfacets
 by each pixel, whose micro-buffer has rays of the lobe. Groups of points gather further bounces for themselves. Each
 sample has other points and pixels turned and shifted differently.
@@ -20,19 +24,23 @@ normals.
 |---|---|
 | fetches, rays | 2 per visited node, some 10 K^2 if triangles are large; 2 n rays for each point of a light source |
 | bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
+| of gloss | 2 fetches for each pixel of a micro-buffer, 6 passes over points and nodes, 192 bytes a point |
 | passes | 4 x `levels` + 2, and for each bounce 4; the tree in parts on Mesa (docs/micro_rendering.md) |
 
 Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). A kilometre of ground takes all points.
 
 Bias (diffuse and glossy indirect light): a piece sends the light of one place on it as far as nothing stands between
 (shaders/micro/clips.frag.glsl); of meshes with more triangles than half of the points the smallest have discs, which
-reach over edges: leaves, grass and hair below the points' spacing are wrong. Points reflect gloss as diffuse; sheen and
+reach over edges: leaves, grass and hair below the points' spacing are wrong. A point's gloss has one lobe for all
+lamps, as wide as they lie apart, and reflects light that was bounced before as diffuse surfaces do. Sheen and
 translucent lobes get none, clear glass is not there, rough diffuse counts as Lambertian.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
 from itertools import product
 
 from ..frame.picture import Frame
@@ -48,6 +56,7 @@ from ..lighting.micro_buffers import (
     BUFFER_DEFINES,
     BUFFER_IMAGE,
     BUFFER_TEXTURES,
+    LOBE_TEXTURES,
     NodeRadiance,
     buffer_bindings,
 )
@@ -85,6 +94,17 @@ def _regions(listed: bool) -> Program:
 
 
 REGIONS, REGIONS_OF_LEVEL = _regions(True), _regions(False)
+
+
+@cache
+def by_direction(program: Program) -> Program:
+    """The same program of micro-buffers, where gloss at points sends light by direction."""
+    return replace(
+        program, name=f"{program.name}, gloss by direction", textures=(*program.textures, *LOBE_TEXTURES),
+        defines=(*program.defines, ("NODE_LOBES", "1")),
+    )  # fmt: skip
+
+
 GLOSSY = Program(
     name="micro-buffers of lobes",
     compute="micro/glossy.comp.glsl",
@@ -183,6 +203,7 @@ class MicroRendering(MultiresRadiosity):
                 "tree_nodes": run.nodes,
                 "piece_clips": run.clips,
                 "node_radiance": self._radiance.image,
+                **self._radiance.lobes,
             },
             "blocks": {"film_view": frame.view_block},
             "constants": buffer_bindings(frame, run, frame.settings.get(self, "side"), **settings, use="micro regions"),
@@ -246,6 +267,7 @@ class MicroRendering(MultiresRadiosity):
         self, frame: Frame, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
     ) -> Iterator[None]:  # fmt: skip
         """Block after block, so that micro-buffers take little memory, fit an image, and no dispatch takes long."""
+        program = by_direction(program) if self._radiance.lobes else program
         program = asked(frame, program, textures := dict(textures))
         side, leaves = (bindings["constants"][name] for name in ("micro_side", "leaf_count"))
         width, height = size

@@ -1,4 +1,6 @@
 // What points of surfaces reflect of even light, as a diffuse surface where each of them lies (addon/lighting/lit_points.py).
+// GLOSS: out_diffuse is without what lobes of microfacets reflect; out_gloss is that, and their roughness, below 0 of mirrors,
+// which throw caustics.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
@@ -8,6 +10,10 @@ void main()
   out_position = vec4(0.0);
   out_normal = vec4(0.0);
   out_albedo = vec4(0.0);
+#ifdef GLOSS
+  out_diffuse = vec4(0.0);
+  out_gloss = vec4(0.0);
+#endif
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 position = surface_position_fetch(pixel);
   if (position.w == 0.0) {
@@ -21,4 +27,13 @@ void main()
   out_position = position;
   out_normal = surface_normal_fetch(pixel);
   out_albedo = vec4(min(albedo, vec3(1.0)), 0.0);
+#ifdef GLOSS
+  out_diffuse = out_albedo;
+  if (s.kind < LOBE_REFRACTION) {
+    bool mirror = s.kind != FRESNEL_DIELECTRIC && s.glossy_roughness <= SMOOTH_MIRROR;
+    s.glossy_weight = vec3(0.0);
+    out_diffuse = vec4(min(surface_albedo(s, MEAN_COSINE), out_albedo.rgb), 0.0);
+    out_gloss = vec4(out_albedo.rgb - out_diffuse.rgb, mirror ? -max(s.glossy_roughness, 1e-3) : s.glossy_roughness);
+  }
+#endif
 }

@@ -6,6 +6,10 @@
 // (light/traced.frag.glsl) such lobes take part of their light from there; both are weighted by the balance of squared
 // densities (Veach's power heuristic), so the sum has the same mean.
 //
+// WAYS: whatever the surface reflects, glossy light is what falls across its direction, without the cosine, and out_ways has the
+// sum of where mirrors would send it, by luminance (lighting/lit_points.py). w of out_glossy: of light that photons answer for
+// where mirrors throw it (LIGHT_GLASS_BLOCKS, which is no matter for what glass passes here).
+//
 // KNOWN_IRRADIANCE: the lights are directions of the world, whose irradiance is known where nothing is in the way
 // (lib/known_irradiance.glsl); what arrived of the light that was drawn, and that, are left in w, for light/openness.
 #include "ask/view.glsl"
@@ -69,6 +73,9 @@ void main()
 {
   out_diffuse = vec4(0.0);
   out_glossy = vec4(0.0);
+#ifdef WAYS
+  out_ways = vec4(0.0);
+#endif
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   if (surface_position_fetch(pixel).w == 0.0) {
     return;
@@ -97,6 +104,9 @@ void main()
   int group = receiver_group(pixel);
   vec3 diffuse = vec3(0.0);
   vec3 glossy = vec3(0.0);
+#ifdef WAYS
+  float by_photons = 0.0;
+#endif
 #ifdef KNOWN_IRRADIANCE
   vec3 drawn = vec3(0.0);
   float arrived = 0.0;
@@ -109,6 +119,10 @@ void main()
     }
 #ifdef OWN_POINTS
     light = own_point(light, i);
+#endif
+#ifdef WAYS
+    bool thrown = (light.flags & LIGHT_GLASS_BLOCKS) != 0;
+    light.flags &= ~LIGHT_GLASS_BLOCKS;
 #endif
     bool whole = LIGHTS_HAVE(LIGHT_AS_A_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
     bool on_diffuse = has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0;
@@ -147,6 +161,9 @@ void main()
       if (on_diffuse && !whole) {
         from_diffuse += arriving * diffuse_reflection(s, grass, to_viewer, direction);
       }
+#ifdef WAYS
+      from_glossy += (dot(s.normal, direction) > 0.0) ? arriving : vec3(0.0);
+#endif
       // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
       towards = whole ? towards : direction;
       // None between a surface and the mirror's normal that was bent up from it (reflecting_normal).
@@ -195,6 +212,11 @@ void main()
       from_glossy *= passing;
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;
+#ifdef WAYS
+      float across = luminance(abs(from_glossy)) * visibility;
+      out_ways += vec4(reflect(-towards, s.normal), 1.0) * across;
+      by_photons += thrown ? across : 0.0;
+#endif
 #ifdef KNOWN_IRRADIANCE
       arrived += luminance(abs(falling)) * visibility;
 #endif
@@ -202,6 +224,9 @@ void main()
   }
   out_diffuse = vec4(diffuse, 0.0);
   out_glossy = vec4(glossy, 0.0);
+#ifdef WAYS
+  out_glossy.w = by_photons;
+#endif
 #ifdef KNOWN_IRRADIANCE
   if (known) {
     float all = luminance(abs(drawn));

@@ -50,7 +50,11 @@ void main()
     uint word = imageLoad(micro, corner + of_buffer).x;
     vec3 ray = micro_ray(f, of_buffer, weight);
     if (word != NOTHING && max_component(weight) > 0.0 && may_mirror(s, ray)) {
-      vec3 radiance = radiance_texel(word & ((1u << uint(id_bits)) - 1u)).rgb;
+      uint index = word & ((1u << uint(id_bits)) - 1u);
+      vec3 radiance = radiance_texel(index).rgb;
+#ifdef NODE_LOBES
+      radiance += lobe_radiance(index, -ray, 0.0);
+#endif
       sum += weight * radiance * MICRO_PASSING(f.place, word, i);
     }
   }

@@ -24,7 +24,11 @@ void gather(ivec2 region, int level_of_region, ivec2 corner)
   }
   micro_fill(f, corner);
   if (part.x == part.y - 1) {
-    imageStore(gathered, own_place, vec4(micro_sum(corner, f.place).rgb, 1.0));
+    vec3 irradiance = micro_sum(corner, f.place).rgb;
+#ifdef NODE_LOBES
+    irradiance += micro_lobes(corner, f);
+#endif
+    imageStore(gathered, own_place, vec4(irradiance, 1.0));
   }
 }
 

@@ -18,6 +18,26 @@ vec3 micro_passing(vec3 place, uint word, int pixel)
 #define MICRO_PASSING(place, word, pixel) vec3(1.0)
 #endif
 
+#ifdef NODE_LOBES
+#include "micro/lobe.glsl"
+// Of gloss: a pixel is PI / micro_side^2 of the hemisphere wide.
+vec3 micro_lobes(ivec2 corner, MicroFrame f)
+{
+  vec3 sum = vec3(0.0);
+  float count = float(micro_side * micro_side);
+  for (int i = 0; i < micro_side * micro_side; i++) {
+    ivec2 pixel = ivec2(i % micro_side, i / micro_side);
+    uint word = MICRO_WORD(corner + pixel);
+    if (word != NOTHING) {
+      vec3 weight;
+      vec3 radiance = lobe_radiance(word & ((1u << uint(id_bits)) - 1u), -micro_ray(f, pixel, weight), 0.25 / count);
+      sum += weight * radiance * MICRO_PASSING(f.place, word, i);
+    }
+  }
+  return sum * (PI / count);
+}
+#endif
+
 // `place`: from where it was drawn.
 vec4 micro_sum(ivec2 corner, vec3 place)
 {

@@ -137,10 +137,12 @@ def test_gloss_that_is_thrown_wider_than_it_is_is_named(monkeypatch, inputs, sai
     notes = left_out.notes_of(plan, scene, some, [material])
     assert bool(notes) == said and all("'Pan'" in note.text and note.subject == "Gloss" for note in notes)
     assert all("as by a roughness of 0.5" in note.text for note in notes)
-    evenly = left_out.notes_of(
-        replace(plan, filled=plan.filled | {"indirect": "micro_rendering"}), scene, some, [material]
+    evenly, by_direction = (
+        left_out.notes_of(replace(plan, filled=plan.filled | {"indirect": name}), scene, some, [material])
+        for name in ("implicit_visibility", "micro_rendering")
     )
     assert bool(evenly) == said and all("as by dull surfaces" in note.text for note in evenly)
+    assert by_direction == ()
     assert (
         left_out.notes_of(plan, scene, FEW, [material])
         == left_out.notes_of(Plan((), (), {}), scene, some, [material])

@@ -230,6 +230,25 @@ def test_white_metal_in_a_lit_sphere_is_as_bright_as_the_sphere(stage, side, wit
     assert seen[..., :3].mean() == pytest.approx(0.5, rel=within)
 
 
+@pytest.mark.parametrize(("roughness", "within", "apart"), [(0.4, 0.06, 0.3), (0.2, 0.4, 0.7)])
+def test_a_wall_of_metal_throws_the_suns_light_on_the_floor(stage, render, roughness, within, apart):
+    """As in Cycles, by direction: .41 of the light came, spread over the floor. What photons bring of a mirror (.73 of
+    the light) is not counted again: it was 1.42 of the light."""
+    stage.rectangle((-4, -4), (4, 2), material=stage.diffuse(0.8))
+    metal = stage.material("ShaderNodeBsdfGlossy", Color=(0.8, 0.6, 0.4, 1), Roughness=roughness)
+    stage.mesh([(-4, 2, 0), (4, 2, 0), (4, 2, 2), (-4, 2, 2)], [(0, 1, 2, 3)], material=metal)
+    stage.light("SUN", turn=(np.radians(50), 0, 0), energy=10.0, angle=0.0)
+    camera = stage.camera((0, -1, 5), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 6.0
+    truth = light_paths(render_passes(stage.scene, "CYCLES", 512, 1, size=(16, 16), bounces=1).images)[
+        "diffuse_indirect"
+    ]
+    found = render(1, samples=4, size=(16, 16), points=2048)
+    assert found.mean(axis=(0, 1)) == pytest.approx(truth.mean(axis=(0, 1)), rel=within)
+    assert found.mean() < 1.05 * truth.mean()
+    assert np.sqrt(np.mean((found - truth) ** 2)) < apart * truth.mean()
+
+
 def test_normals_of_points_are_those_of_the_smooth_surface():
     """Between three corners, of a mesh that is stretched and of its mirror image."""
     corners = np.array([[0.0, 0.6, 0.8], [0.6, 0.0, 0.8], [-0.8, 0.0, 0.6]])

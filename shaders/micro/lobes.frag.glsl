@@ -1,0 +1,32 @@
+// What gloss at points sends of direct light, by direction: `out_flux`, the integral of its radiance over all directions, and
+// `out_ways`, the mean of these directions times its luminance, so that both are means over what is below a node. w: the
+// area. `out_all`: direct light with the same as of a diffuse surface, for groups, which do not look at directions.
+//
+// The lobe is one of von Mises and Fisher about the mirrored light. Facets of roughness alpha deviate from the normal like
+// one of sharpness 2 / alpha^2, directions that they mirror like one of a quarter of that over the cosine (Wang, Ren, Gong,
+// Snyder & Guo 2009, "All-frequency rendering of dynamic, spatially-varying reflectance").
+#include "lib/math.glsl"
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 gloss = gloss_fetch(pixel);
+  vec4 ways = ways_fetch(pixel);
+  vec3 normal = octahedral_decode(normal_fetch(pixel).xy);
+  float area = sent_fetch(pixel).w;
+  vec4 across = across_fetch(pixel);
+  vec3 flux = gloss.rgb * across.rgb;
+  if (gloss.w < 0.0) {  // what mirrors throw of lamps, photons bring
+    flux *= clamp(1.0 - across.w / max(ways.w, DARK), 0.0, 1.0);
+  }
+  bool finite = is_finite(flux.r + flux.g + flux.b) && is_finite(ways.x + ways.y + ways.z + ways.w) && ways.w > 0.0;
+  flux = finite ? max(flux, vec3(0.0)) : vec3(0.0);
+  vec3 mean = finite ? ways.xyz / ways.w : vec3(0.0);
+  float cosine = clamp(dot(mean, normal), 0.0, 1.0);
+  float alpha = gloss.w * gloss.w;
+  float sharpness = 0.5 / max(alpha * alpha * max(cosine, 0.05), 1e-6);
+  float length_of_mean = (1.0 + exp(-2.0 * sharpness)) / (1.0 - exp(-2.0 * sharpness)) - 1.0 / sharpness;
+  out_flux = vec4(flux, area);
+  out_ways = vec4(mean * (length_of_mean * luminance(flux)), area);
+  out_all = vec4(direct_fetch(pixel).rgb + flux * (cosine / PI), 0.0);
+}
