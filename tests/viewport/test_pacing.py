@@ -8,7 +8,8 @@ import pytest
 from mathutils import Vector
 
 from addon import viewport
-from addon.gfx import images
+from addon.frame.bands import Bands
+from addon.gfx import images, passes
 from addon.viewport.pace import GuidePace
 from addon.viewport.picture import Viewport
 from tests.viewport.region import SIZE
@@ -101,6 +102,33 @@ def test_sample_at_rest_is_done_in_parts_and_the_coarse_picture_stays_until_it_h
             assert np.array_equal(images.read(picture), coarse)
     assert redraws > 3
     assert region.viewport.picture.size == SIZE
+
+
+def test_light_of_virtual_lights_comes_in_bands_where_a_draft_rests(region, monkeypatch):
+    """Each band of the gather takes all of a redraw here: no redraw draws two."""
+    region.rest()
+    region.viewport.bands = Bands()
+    fullscreen, drawn = passes.fullscreen, []
+
+    def slow(program, *arguments, **named):
+        fullscreen(program, *arguments, **named)
+        if program.name == "instant radiosity":
+            region.clock.now += viewport.MOST_BUDGET_S
+            drawn.append((region.viewport.scale, named["rows"]))
+
+    monkeypatch.setattr(passes, "fullscreen", slow)
+    region.viewport.pace.cost = {1: 10.0, 2: 0.3, 4: 0.06, 8: 0.01}
+    region.camera = region.moved(0.1)
+    bands = []
+    for _ in range(60):
+        before = len(drawn)
+        region.draw()
+        region.clock.now += viewport.REST_S
+        bands.append(drawn[before:])
+        if region.viewport.scale == 1:
+            break
+    assert max(map(len, bands)) == 1
+    assert len([one for one in drawn if one[0] == 2]) >= 2
 
 
 def test_picture_between_two_samples_is_the_mean_of_whole_ones(region):
