@@ -37,6 +37,7 @@ from ..surfaces.seen_layers import SeenLayers
 from . import froxels
 from .leaving_light import LEAVES
 from .media import RAY_TEXTURES, Rays
+from .path_sources import shaded_roughness
 
 MANY = 64  # samples: below, light is found in cells, and at a few surfaces
 WIDE, SMALL = 64, 32  # pixels along the shorter side: in smaller pictures cells were much of what is seen
@@ -90,8 +91,9 @@ def walks_program(start: str, kinds: int, world: bool, shining: bool, once: bool
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
         constants=(
-            *CONSTANTS, ("INT", "is_spread"), ("INT", "walks"), ("INT", "bounces"), ("INT", "scatters"),
+            *CONSTANTS, ("INT", "walks"), ("INT", "bounces"), ("INT", "scatters"),
             *(froxels.CONSTANTS if start == CELLS else ()),
+            *((("FLOAT", "shaded_roughness"),) if start == ON_SURFACES else ()),
         ),
         defines=(
             *defines_of(kinds, world), *START[start], *_shining(shining), *((("ONE_SCATTER", "1"),) if once else ()),
@@ -141,11 +143,12 @@ def surfaces_program(shining: bool) -> Program:
         "media/onto_surfaces.frag.glsl",
         textures=(
             *SURFACE_TEXTURES, ("RGBA32F", "known_light"), *((("RGBA32F", "known_straight"),) if shining else ()),
+            ("RGBA32F", "energy_table"),
         ),
         blocks=((VIEW, "film_view"),),
-        constants=(("IVEC2", "shown_pixel"), ("INT", "stride")),
+        constants=(("IVEC2", "shown_pixel"), ("INT", "stride"), ("FLOAT", "shaded_roughness")),
         defines=_shining(shining),
-        outputs=(("VEC4", "out_indirect"), *((("VEC4", "out_direct"),) if shining else ())),
+        outputs=(("VEC4", "out_indirect"), *((("VEC4", "out_direct"),) if shining else ()), ("VEC4", "out_glossy")),
     )  # fmt: skip
 
 
@@ -185,7 +188,6 @@ class MediaBounces:
         constants = asked | {
             "shown_pixel": (0, 0),
             "stride": 1,
-            "is_spread": 0,
             "walks": 1,
             "bounces": max(bounces, 1),
             "scatters": EVERY,
@@ -207,7 +209,6 @@ class MediaBounces:
         constants = {
             "shown_pixel": (0, 0),
             "stride": 1,
-            "is_spread": 0,
             "walks": 1,
             "bounces": bounces,
             "scatters": EVERY,
@@ -225,7 +226,6 @@ class MediaBounces:
         constants |= {
             "shown_pixel": (0, 0),
             "stride": 1,
-            "is_spread": 1,
             "walks": self._walks,
             "bounces": max(bounces, 1),
             "scatters": EVERY,
@@ -253,29 +253,26 @@ class MediaBounces:
         program = walks_program(ON_SURFACES, lit.kinds, lit.world, media.emits, scatters == 1)
         program, bound = self._bound(frame, lit, program)
         constants = asked | {
-            "is_spread": int(spread), "walks": self._walks if spread else 1, "scatters": scatters,
-            "bounces": min(frame.settings.bounces, MOST_STEPS),
+            "walks": self._walks if spread else 1, "scatters": scatters, "shown_pixel": (0, 0), "stride": 1,
+            "bounces": min(frame.settings.bounces, MOST_STEPS), "shaded_roughness": shaded_roughness(frame),
         }  # fmt: skip
-        if not spread:
-            constants |= {"shown_pixel": (0, 0), "stride": 1}
-            target = frame.target(*names)
-            for band in frame.bands(technique, names[0]):
-                passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, constants=constants, **bound)
-                yield
-            frame.count(technique, "passes")
-            return
-        stride = STRIDE if min(frame.size) >= WIDE else SMALL_STRIDE
-        turn = frame.sample * 7 % stride**2  # neighbours in turn far apart
-        constants |= {"shown_pixel": (turn % stride, turn // stride), "stride": stride}
-        size = tuple(-(-side // stride) for side in frame.size)
+        if spread:
+            stride = STRIDE if min(frame.size) >= WIDE else SMALL_STRIDE
+            turn = frame.sample * 7 % stride**2  # neighbours in turn far apart
+            constants |= {"shown_pixel": (turn % stride, turn // stride), "stride": stride}
+        size = tuple(-(-side // constants["stride"]) for side in frame.size)
         found = tuple(images.pool.take(*size, "RGBA32F") for _ in names)
-        passes.fullscreen(program, images.Target(found), constants=constants, **bound)
-        yield
+        for band in [None] if spread else frame.bands(technique, names[0]):
+            passes.fullscreen(program, images.Target(found), rows=band, constants=constants, **bound)
+            yield
         passes.fullscreen(
-            surfaces_program(media.emits), frame.target(*names), blend="ADDITIVE_PREMULT",
-            textures={**surface_bindings(frame), **dict(zip(("known_light", "known_straight"), found))},
+            surfaces_program(media.emits), frame.target(*names, "radiance.glossy_indirect"), blend="ADDITIVE_PREMULT",
+            textures={
+                **surface_bindings(frame), **dict(zip(("known_light", "known_straight"), found)),
+                "energy_table": frame.materials.energy_table,
+            },
             blocks={"film_view": frame.view_block},
-            constants={name: constants[name] for name in ("shown_pixel", "stride")},
+            constants={name: constants[name] for name in ("shown_pixel", "stride", "shaded_roughness")},
         )  # fmt: skip
         for image in found:
             images.pool.give(image)

@@ -159,6 +159,7 @@ class Airlight(Technique):
         Write("radiance.volume_indirect", "RGBA32F", "Light that media scatter after other bounces", True),
         Write("radiance.volume_emission", "RGBA32F", "Light that media emit"),
         Write("radiance.diffuse_indirect", "RGBA32F", "Light that media scatter onto diffuse surfaces", True),
+        Write("radiance.glossy_indirect", "RGBA32F", "Light that media scatter onto rough gloss", True),
         Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive from media that shine", True),
     )
 

@@ -18,6 +18,9 @@
 #include "media/view_ray.glsl"
 #endif
 #include "ask/leaving.glsl"
+#ifdef FROM_SURFACES
+#include "media/wide_lobe.glsl"
+#endif
 #ifdef FROM_FROXELS
 #include "media/froxels.glsl"
 #endif
@@ -456,12 +459,11 @@ void main()
   Start start = start_at(ray_origin(s.position, s.geometric_normal), -ray.direction);
   start.stop.normal = s.normal;
   start.stop.face = s.geometric_normal;
-  start.weight = (is_spread != 0) ? vec3(1.0) : s.diffuse;
-  if (is_spread != 0) {
-    // For what spreads this over the pixels around: light of nothing counts as nothing.
-    out_found.w = (ray.hit && max_component(s.diffuse) > 0.0) ? min(ray.limit, 1e18) : -1.0;
-  }
-  if (!ray.hit || !(max_component(s.diffuse) > 0.0)) {
+  start.weight = vec3(1.0);
+  // For what spreads this over the pixels around: light of nothing counts as nothing.
+  bool takes = ray.hit && (max_component(s.diffuse) > 0.0 || has_wide_lobe(s, shaded_roughness));
+  out_found.w = takes ? min(ray.limit, 1e18) : -1.0;
+  if (!takes) {
     return;
   }
 #endif

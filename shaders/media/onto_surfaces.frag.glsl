@@ -1,7 +1,12 @@
 // Irradiance by media that is known at every `stride`-th pixel, brought to all pixels: the mean over 5 x 5 of the known ones
-// around that are as far away and face alike, times each pixel's own colour.
-#include "lib/gbuffer.glsl"
+// around that are as far away and face alike, times each pixel's own colour. Lobes that no rays follow reflect it as if it
+// came evenly from all sides.
 #include "lib/math.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/brdf.glsl"
+#include "ask/view.glsl"
+#include "indirect/albedo.glsl"
+#include "media/wide_lobe.glsl"
 
 #define REACH 2.5
 
@@ -13,13 +18,15 @@ float tent(float place, float middle)
 void main()
 {
   out_indirect = vec4(0.0);
+  out_glossy = vec4(0.0);
 #ifdef SHINING
   out_direct = vec4(0.0);
 #endif
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   Surface s = SURFACE_READ(pixel);
   vec4 seen = surface_position_fetch(pixel);
-  if (seen.w == 0.0 || !(max_component(s.diffuse) > 0.0)) {
+  bool wide = has_wide_lobe(s, shaded_roughness);
+  if (seen.w == 0.0 || !(wide || max_component(s.diffuse) > 0.0)) {
     return;
   }
   ivec2 size = known_light_size();
@@ -30,8 +37,9 @@ void main()
   vec3 found = vec3(0.0);
   vec3 straight = vec3(0.0);
   float total = 0.0;
-  for (int y = -2; y <= 2; y++) {
-    for (int x = -2; x <= 2; x++) {
+  int around = (stride > 1) ? 2 : 0;
+  for (int y = -around; y <= around; y++) {
+    for (int x = -around; x <= around; x++) {
       ivec2 known = corner + ivec2(x, y);
       ivec2 texel = clamp(known, ivec2(0), size - 1);
       vec4 light = known_light_fetch(texel);
@@ -50,8 +58,18 @@ void main()
       total += weight;
     }
   }
-  out_indirect = vec4(found / max(total, 1e-30) * s.diffuse, 0.0);
+  found /= max(total, 1e-30);
+  straight /= max(total, 1e-30);
+  vec3 lobe = vec3(0.0);
+  if (wide) {
+    float mu = max(dot(s.normal, view_toward(s.position)), 0.0);
+    lobe = surface_albedo(s, mu) - rough_albedo(s.diffuse, s.diffuse_weight, s.diffuse_roughness);
+  }
+  bool soft = s.kind > LOBE_REFRACTION;
+  vec3 diffuse = s.diffuse + (soft ? lobe : vec3(0.0));
+  out_indirect = vec4(found * diffuse, 0.0);
+  out_glossy = vec4(soft ? vec3(0.0) : (found + straight) * lobe, 0.0);
 #ifdef SHINING
-  out_direct = vec4(straight / max(total, 1e-30) * s.diffuse, 0.0);
+  out_direct = vec4(straight * diffuse, 0.0);
 #endif
 }

@@ -773,3 +773,17 @@ def test_air_keeps_the_light_of_a_floor_whose_lamp_it_does_not_see(stage):
     assert direct["unseen by air"] == 0 and direct["unseen by floor"] == pytest.approx(direct["seen"], rel=1e-3)
     assert indirect["unseen by air"] == pytest.approx(indirect["seen"], rel=0.05)
     assert indirect["unseen by floor"] < 0.02 * indirect["seen"]
+
+
+@pytest.mark.parametrize("samples", [4, 16])
+def test_rough_gloss_in_fog_shows_its_light(stage, samples):
+    """As Cycles has it: a rough metal floor in a white fog below a sun, which mirrors no surface."""
+    stage.camera((0, -4, 1.5), (1.2, 0, 0), angle=0.6)
+    stage.floor(6.0, material=stage.principled(Metallic=1.0, Roughness=0.8, Base_Color=(0.9, 0.6, 0.3, 1)))
+    stage.light("SUN", turn=(0.4, 0.3, 0), energy=3.0, angle=0.1)
+    box(stage, volume(stage, Color=(0.9, 0.9, 0.9, 1), Density=0.1), (-6, -6, 0.01), (6, 6, 3))
+    own, cycles = (
+        stage.render(count, size=(24, 20), bounces=1, engine=engine)["glossy_indirect"][2:8, 2:-2, :3].mean((0, 1))
+        for count, engine in ((samples, "CANDELA"), (512, "CYCLES"))
+    )
+    assert own == pytest.approx(cycles, rel=0.15)
