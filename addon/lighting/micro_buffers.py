@@ -100,7 +100,7 @@ PULL_POINTS, PULL = (
 LOBES = passes.fullscreen_program(
     "light of gloss at points",
     "micro/lobes.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in ("sent", "direct", "across", "ways", "gloss", "normal")),
+    textures=tuple(("RGBA32F", name) for name in ("sent", "direct", "across", "ways", "gloss", "point_normal")),
     outputs=tuple(("VEC4", f"out_{name}") for name in ("flux", "ways", "all")),
 )
 LOBE_TEXTURES = (("RGBA32F", "node_flux"), ("RGBA32F", "node_ways"))  # of programs that look at gloss by direction
@@ -240,7 +240,7 @@ class NodeRadiance:
             LOBES, images.Target(tuple(into)),
             textures={
                 "sent": sent, "direct": direct, "across": across, "ways": ways, "gloss": run.shaded.colors[4],
-                "normal": run.shaded.colors[1],
+                "point_normal": run.shaded.colors[1],
             },
         )  # fmt: skip
         frame.count(technique, "passes", 2)

@@ -143,12 +143,12 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
 {
   int material = triangle_material(hit);
   float code = reflectance_fetch(ivec2(material & 15, material >> 4)).a;
-  bool mirrors = code > 0.5 && max_component(met.reflection.grazing) > 0.0;
+  bool is_mirror = code > 0.5 && max_component(met.reflection.grazing) > 0.0;
   met.mirror_alpha = -1.0;
   met.mirror_normal = met.normal;
   met.mirror_share = vec3(0.0);
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
-  for (; mirrors; mirrors = false) {
+  for (; is_mirror; is_mirror = false) {
     met.mirror_alpha = max(code - 1.0, 0.0);
     met.mirror_share = mirror_scale(material);
     vec3 smooth_normal = triangle_shading_normal(hit, met.position);

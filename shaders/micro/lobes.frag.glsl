@@ -10,20 +10,20 @@
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec4 gloss = gloss_fetch(pixel);
-  vec4 ways = ways_fetch(pixel);
-  vec3 normal = octahedral_decode(normal_fetch(pixel).xy);
+  vec4 lobe = gloss_fetch(pixel);
+  vec4 mirrored = ways_fetch(pixel);
+  vec3 axis = octahedral_decode(point_normal_fetch(pixel).xy);
   float area = sent_fetch(pixel).w;
-  vec4 across = across_fetch(pixel);
-  vec3 flux = gloss.rgb * across.rgb;
-  if (gloss.w < 0.0) {  // what mirrors throw of lamps, photons bring
-    flux *= clamp(1.0 - across.w / max(ways.w, DARK), 0.0, 1.0);
+  vec4 falling = across_fetch(pixel);
+  vec3 flux = lobe.rgb * falling.rgb;
+  if (lobe.w < 0.0) {  // what mirrors throw of lamps, photons bring
+    flux *= clamp(1.0 - falling.w / max(mirrored.w, DARK), 0.0, 1.0);
   }
-  bool finite = is_finite(flux.r + flux.g + flux.b) && is_finite(ways.x + ways.y + ways.z + ways.w) && ways.w > 0.0;
+  bool finite = is_finite(flux.r + flux.g + flux.b) && is_finite(mirrored.x + mirrored.y + mirrored.z + mirrored.w) && mirrored.w > 0.0;
   flux = finite ? max(flux, vec3(0.0)) : vec3(0.0);
-  vec3 mean = finite ? ways.xyz / ways.w : vec3(0.0);
-  float cosine = clamp(dot(mean, normal), 0.0, 1.0);
-  float alpha = gloss.w * gloss.w;
+  vec3 mean = finite ? mirrored.xyz / mirrored.w : vec3(0.0);
+  float cosine = clamp(dot(mean, axis), 0.0, 1.0);
+  float alpha = lobe.w * lobe.w;
   float sharpness = 0.5 / max(alpha * alpha * max(cosine, 0.05), 1e-6);
   float length_of_mean = (1.0 + exp(-2.0 * sharpness)) / (1.0 - exp(-2.0 * sharpness)) - 1.0 / sharpness;
   out_flux = vec4(flux, area);
