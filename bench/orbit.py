@@ -10,15 +10,17 @@ draft, in which the middles of neighbouring pixels count, too (addon/film/filter
     after the edit  the same in the three steps after the lamp's edit
     steps/s         by processor seconds, of all threads
 
-Both ways draw the same steps one after the other, the way without history with one seed, as a viewport does. Errors are
-means over `--seeds`: all steps without history share the luck of one (camera, five seeds: .044 to .089).
+With history all steps are drawn one after the other. Without it the steps that are compared are drawn once more, each
+with the seed that it had there: a viewport without history draws all with one, whose luck decides more than all else
+(camera, five seeds: .044 to .089). Errors are means over `--seeds`.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +35,7 @@ HEAD = ("scene", "what moves", "error without", "with history", "ratio", "fresh:
 MOST = 1.0  # error of a pixel that counts
 POINT = 1e-3  # pixels, half the width of a filter that does not spread
 AFTER = 3  # steps after an edit
+STRIP = 5  # steps that a picture shows
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -43,6 +46,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", default="96x72", help="pixels of the draft")
     parser.add_argument("--seeds", type=int, default=3, help="figures are means over so many")
     parser.add_argument("--truth", type=int, default=64, help="samples of a converged picture")
+    parser.add_argument("--strip", type=Path, help="write a picture: converged, without history, with it, by step")
     parser.add_argument("--page", action="store_true", help=f"write rows into docs/{PAGE.name}; others stay")
 
 
@@ -75,22 +79,33 @@ def row_of(name: str, way: str, options: argparse.Namespace) -> tuple[str, ...]:
     edit = options.steps // 2
     measured = range(edit, edit + AFTER) if way == "edit" else range(1, options.steps, options.every)
     truths = [steps.truth(number, options.truth) for number in measured]
-    found = {}
-    for history in (True, False):
-        drawn = [steps.drawn(history, seed) for seed in range(options.seeds)]
-        found[history] = (
-            np.array([[errors(shown[k], truth) for k, truth in zip(measured, truths)] for shown, _, _ in drawn]),
-            float(np.mean([speed for _, _, speed in drawn])),
-        )
-        if history:
-            masks = np.array([[fresh[k] for k in measured] for _, fresh, _ in drawn])
-    (better, quick), (seen, slow) = found[True], found[False]
+    drawn = [steps.drawn(seed, measured) for seed in range(options.seeds)]
+    better, seen = (
+        np.array([[errors(picture, truth) for picture, truth in zip(getattr(one, name), truths)] for one in drawn])
+        for name in ("joined", "alone")
+    )
+    masks = np.array([one.fresh for one in drawn])
+    slow, quick = np.mean([one.speed for one in drawn], axis=0)
+    if options.strip:
+        write_strip(options.strip, truths, drawn[0].alone, drawn[0].joined)
     before, after = float(seen.mean()), float(better.mean())
     new = [float(one[masks].mean()) if masks.any() else 0.0 for one in (seen, better)]
     return (
         path.stem.replace("_", " "), "lamp's power, 3 steps after" if way == "edit" else way, f"{before:.4f}",
         f"{after:.4f}", f"{after / before:.2f}", f"{new[0]:.4f}", f"{new[1]:.4f}", f"{slow:.2f}", f"{quick:.2f}",
     )  # fmt: skip
+
+
+def write_strip(path: Path, *rows: list[np.ndarray]) -> None:
+    """STRIP of the steps side by side, one row of pictures (H, W, 3) below the other."""
+    from addon.compare.metrics import display
+    from bench.strips import stacked, write_picture
+
+    exposure = float(-np.log2(max(np.percentile(rows[0][0], 95), 1e-6)))
+    chosen = np.linspace(0, len(rows[0]) - 1, STRIP).astype(int)
+    height, width = rows[0][0].shape[:2]
+    columns = [stacked([display(row[k], exposure) for row in rows], width, height) for k in chosen]
+    write_picture(path, np.concatenate(columns, axis=1))
 
 
 def errors(shown: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -112,6 +127,16 @@ def through_film(middles: np.ndarray, width: float) -> np.ndarray:
         inside = (number >= 2 * pixels) & (number < len(number) - 2 * pixels)  # at the rim own points alone count
         seen = np.where(inside[:, None, None] if axis == 0 else inside[None, :, None], blurred, seen)
     return seen
+
+
+@dataclass
+class Drawn:
+    """Drafts of the measured steps."""
+
+    joined: list[np.ndarray] = field(default_factory=list)  # (H, W, 3) with history
+    alone: list[np.ndarray] = field(default_factory=list)  # (H, W, 3) the same without it
+    fresh: list[np.ndarray] = field(default_factory=list)  # (H, W) where there is no history
+    speed: tuple[float, float] = (0.0, 0.0)  # steps a processor second, without history and with it
 
 
 class Steps:
@@ -180,25 +205,34 @@ class Steps:
         drawn = _picture(self._truth, replace(snapshot, film=film), settings, samples)[..., :3]
         return through_film(drawn, snapshot.film.filter_width)
 
-    def drawn(self, history: bool, seed: int) -> tuple[list[np.ndarray], list[np.ndarray], float]:
-        """Drafts of all steps (H, W, 3), where each has no history (H, W), and steps a processor second."""
+    def drawn(self, seed: int, measured: Sequence[int]) -> Drawn:
+        """Drafts of all steps with history, and of those that are measured without it."""
         from addon import techniques
         from addon.frame.run import Renderer
         from addon.gfx import images
 
-        renderer = Renderer(techniques.make_registry)
+        joined, alone = (Renderer(techniques.make_registry) for _ in range(2))
         settings = self.settings(samples=1, shows=frozenset(), seed=seed).as_draft()
-        settings = replace(settings, values={**settings.values, ("history", "drafts"): history})
-        shown, fresh, took = [], [], []
+        drafts = {
+            history: replace(settings, values={**settings.values, ("history", "drafts"): history})
+            for history in (False, True)
+        }
+        found, took = Drawn(), ([], [])
         for number in range(self.count):
             snapshot, started = self.snapshot(number), time.process_time()
-            shown.append(_picture(renderer, snapshot, settings, 1)[..., :3])
-            took.append(time.process_time() - started)
-            if history:
-                place = images.read(renderer.frame.images["history.place"])
-                fresh.append(place[..., 3] == 1.0)
-        renderer.release()
-        return shown, fresh, 1.0 / float(np.median(took))
+            picture = _picture(joined, snapshot, drafts[True], 1)[..., :3]
+            took[1].append(time.process_time() - started)
+            if number not in measured:
+                continue
+            found.joined.append(picture)
+            found.fresh.append(images.read(joined.frame.images["history.place"])[..., 3] == 1.0)
+            own, started = replace(drafts[False], seed=joined.frame.settings.seed), time.process_time()
+            found.alone.append(_picture(alone, snapshot, own, 1)[..., :3])
+            took[0].append(time.process_time() - started)
+        joined.release()
+        alone.release()
+        found.speed = tuple(1.0 / float(np.median(one)) for one in took)
+        return found
 
 
 def _picture(renderer, snapshot, settings, samples: int) -> np.ndarray:

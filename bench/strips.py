@@ -330,7 +330,7 @@ def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarra
     width, height = strip.size
     pictures = strip.drawn(scene, strip.size) if strip.drawn else []
     if pictures:
-        return _stacked([np.repeat(one[..., None], 3, axis=2) for one in pictures], width, height), 0.0
+        return stacked([np.repeat(one[..., None], 3, axis=2) for one in pictures], width, height), 0.0
     for one in strip.entrants:
         (one.made_by or strip.make)(scene)
         settings = bpy.context.scene.candela
@@ -340,10 +340,10 @@ def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarra
         pictures.append(_of_frame(one.shows) if one.shows else found.images["combined"][..., :3])
     if exposure is None:
         exposure = float(-np.log2(max(np.percentile(pictures[-1], 97), 1e-6)))
-    return _stacked([display(one, exposure) for one in pictures], width, height), exposure
+    return stacked([display(one, exposure) for one in pictures], width, height), exposure
 
 
-def _stacked(pictures: list[np.ndarray], width: int, height: int) -> np.ndarray:
+def stacked(pictures: list[np.ndarray], width: int, height: int) -> np.ndarray:
     """Displayed values, row 0 at the bottom, one above the other with gaps below and to the right; row 0 at the top."""
     column = np.ones(((height + GAP) * len(pictures) - GAP, width + GAP, 3))
     for row, picture in enumerate(pictures):

@@ -10,11 +10,13 @@ so that n pictures of a still surface have the error of n samples. The same surf
 plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees); n is multiplied by the share of
 the bilinear weights that is on it. What was hidden before has only fresh light. Indirect light is filtered over
 neighbours (film/neighbours.py) when it is joined, not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24
-on not at all. While objects move n is at most FEW, for light straight from lamps only where a moving object's box
+on not at all. On objects that move n is at most FEW, as it is for light straight from lamps where a moving object's box
 stands or stood before one of them; there it is kept within the spread of what is fresh on 5x5 pixels, so that shadows
-move along. (Everywhere, where the world or meshes shine.) While lamps move n is at most LAMPS, and less where a step
-changes more than LAG / LAMPS of their light. After any other edit (and while lamps of node trees move) there is no
-history at all (frame/history.py); what shines is never carried: it moves otherwise than its surface.
+move along. (Everywhere, where the world or meshes shine.) Indirect light beside moving objects counts for as many
+pictures as leave the least error, by the share of the hemisphere that a step changes. While lamps move n is at most
+LAMPS, and less where a step changes more than LAG / LAMPS of their light. After any other edit (and while lamps of node
+trees move) there is no history at all (frame/history.py); what shines is never carried: it moves otherwise than its
+surface.
 
 In drafts of the viewport, and, where `animation` says so, in final pictures of one sample drawn one after the other
 by one process; a picture then depends on those before it. Never in slices, with motion blur or where samples may end
@@ -22,10 +24,11 @@ early: all machines would need the same past.
 
 | cost | per picture |
 |---|---|
-| pass | 16 + 4 fetches of history per pixel; while objects move 12 for each of them and lamp, 50 in their shadows |
+| pass | 16 + 4 fetches of history per pixel; while objects move 14 for each of them and lamp, 50 in their shadows |
 | images | 4 RGBA32F of the picture's size, kept |
 
-Bias: light that changes as things move lags by up to FEW pictures, of lamps that move by LAMPS; sharp shadows of
+Bias: light that changes as things move lags by up to FEW pictures, bounced light far from them by MANY, light of lamps
+that move by LAMPS; sharp shadows of
 moved cameras are looked up between pixels. Bounded by the tests above. Sources: Nehab et al. 2007 (reprojection);
 Schied et al. 2017 (SVGF: light without colour, tests of surfaces); Salvi 2016 (bounds by the spread of neighbours).
 """
@@ -48,7 +51,8 @@ from ..snapshot.scene import Light, Snapshot
 from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 
-MANY, FEW = 32, 8  # samples that history counts for at most; while objects move
+MANY, FEW = 32, 8  # samples that history counts for at most; on objects that move and in their shadows
+NOISE = 0.05  # relative variance of the indirect light of a draft, by `bench orbit`: what a step is weighed against
 LAMPS = 3.0  # while lamps move: what is shown lags by so many steps
 LAG = 0.3  # of their light, by which what is shown may lag behind lamps that move
 PATHS = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
@@ -66,7 +70,7 @@ RECALL = passes.fullscreen_program(
         *(("RGBA32F", f"before_{write.name.partition('.')[2]}") for write in REMEMBERED),
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("FLOAT", "most_still"), ("FLOAT", "most_moved")),
+    constants=(("FLOAT", "most_still"), ("FLOAT", "most_moved"), ("FLOAT", "draft_noise")),
     outputs=tuple(
         ("VEC4", f"out_{name}") for name in ("place", "facing", "direct", "indirect", "direct_light", "indirect_light")
     ),
@@ -140,7 +144,7 @@ class History(Technique):
                     **{f"before_{name.partition('.')[2]}": image for name, image in kept.items()},
                 },
                 blocks={"film_view": frame.view_block},
-                constants={"most_still": float(MANY), "most_moved": float(FEW)},
+                constants={"most_still": float(MANY), "most_moved": float(FEW), "draft_noise": NOISE},
             )  # fmt: skip
             yield
             if frame.settings.samples == 1 or frame.settings.schedule.is_draft:
@@ -188,6 +192,7 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
             *_between(moved, origin, before.origin),
             *_into_box(one.matrix, mesh, origin),
             *_into_box(moved @ one.matrix, mesh, before.origin),
+            *_sphere(moved, one.matrix, mesh, origin),
         ]
     rows += [
         (*one.centre, -1.0 - np.tan(one.radius) if one.kind == lights.SUN else one.reach) for one in lamps
@@ -254,6 +259,17 @@ def _between(matrix: np.ndarray, now: np.ndarray, then: np.ndarray) -> np.ndarra
     out = matrix[:3].copy()
     out[:, 3] += matrix[:3, :3] @ now - then
     return out
+
+
+def _sphere(moved: np.ndarray, matrix: np.ndarray, mesh, origin: np.ndarray) -> np.ndarray:
+    """(2, 4) the sphere around an object's box: middle, relative to the origin, and radius; how far a corner of the box
+    has moved at most, m."""
+    sides = np.array([mesh.bounds_min, mesh.bounds_max])
+    corners = np.stack(np.meshgrid(*sides.T), axis=-1).reshape(8, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+    then = corners @ moved[:3, :3].T + moved[:3, 3]
+    middle = corners.mean(axis=0)
+    radius = np.linalg.norm(corners - middle, axis=1).max()
+    return np.array([(*(middle - origin), radius), (np.linalg.norm(then - corners, axis=1).max(), 0.0, 0.0, 0.0)])
 
 
 def _into_box(matrix: np.ndarray, mesh, origin: np.ndarray) -> np.ndarray:

@@ -7,13 +7,14 @@
 //   1  its render origin from this one's; w: how many objects have moved
 //   1  how many lamps; y: 1 where there is other light than theirs; z: pictures that light counts for at most, since
 //      lamps have moved; w: 1 where their shadows may have moved by more than they are blurred
-//   9  of each object: from where it is to where it was, and to its box, within -1..1, now and then
+//   11 of each object: from where it is to where it was; to its box, within -1..1, now and then; the middle and radius of
+//      the sphere around it; how far it has moved
 //   1  of each lamp: place and reach, or the way to a sun and -1 - tangent of its radius
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 
 #define OBJECTS 5  // texel of the first one
-#define TEXELS 9  // of each
+#define TEXELS 11  // of each
 
 struct Found {
   vec3 direct;
@@ -172,6 +173,22 @@ bool may_have_changed(vec3 position, vec3 shift, int moved)
   return false;
 }
 
+// Pictures that bounced light counts for at most beside what moves. n of them have the squared error (n c)^2 by their lag
+// and noise / 2n, where c is the share of the hemisphere that a step changes: least at the n below. A sphere of radius r
+// that moves by m at the distance d covers 2 r m of d^2 anew and uncovers as much; of its light half differs on average.
+float most_beside(vec3 position, int moved)
+{
+  float change = 1e-6;
+  for (int k = 0; k < moved; k++) {
+    vec4 sphere = table(OBJECTS + TEXELS * k + 9);
+    float moves = table(OBJECTS + TEXELS * k + 10).x;
+    vec3 way = position - sphere.xyz;
+    float radius = max(sphere.w, 1e-6);
+    change += radius * moves / (PI * max(dot(way, way), radius * radius));
+  }
+  return pow(draft_noise / (4.0 * change * change), 1.0 / 3.0);
+}
+
 vec3 reflected(vec3 light, vec3 color, vec3 fresh)
 {
   return vec3((color.r > 1e-3) ? light.r * color.r : fresh.r, (color.g > 1e-3) ? light.g * color.g : fresh.g,
@@ -215,7 +232,8 @@ void main()
   vec3 indirect = arriving(new_indirect.rgb, color);
   vec2 counts = vec2(0.0);
   if (found.weight > 0.0) {
-    counts = min(found.counts, (moved > 0) ? vec2(within ? most_moved : most_still, most_moved) : vec2(most_still));
+    counts = min(found.counts, vec2(within ? most_moved : most_still));
+    counts.y = within ? counts.y : min(counts.y, most_beside(position.xyz, moved));
     counts = min(counts, vec2(table(4).z));
     if (table(4).w > 0.0 || (moved > 0 && may_have_changed(position.xyz, shift, moved))) {
       counts.x = min(counts.x, most_moved);

@@ -13,7 +13,7 @@ from addon.gfx import images
 from addon.lighting import probes
 from addon.snapshot import SnapshotCache, camera_of_scene, take
 from addon.snapshot.scene import Light
-from addon.techniques.history import FEW, LAMPS, _between, _into_box, _outruns_penumbra, _straight_light
+from addon.techniques.history import FEW, LAMPS, _between, _into_box, _outruns_penumbra, _sphere, _straight_light
 from addon.ui.properties import settings_of
 from tests.viewport.region import Region
 
@@ -173,3 +173,25 @@ def test_history_counts_by_how_much_of_a_place_shows_the_surface(drafts):
     counts = counts[counts > 0]
     assert np.median(counts) == pytest.approx(2.0)
     assert 0.02 < ((counts > 1.05) & (counts < 1.95)).mean() < 0.3
+
+
+def test_a_box_is_within_a_sphere_that_moves_with_it():
+    """Closed form: a box of 2 x 4 x 4 m whose middle was 2 m to the side, seen from an origin 10 m away."""
+
+    class Box:
+        bounds_min, bounds_max = np.array([-1.0, 0.0, -2.0]), np.array([1.0, 4.0, 2.0])
+
+    then = np.eye(4)
+    then[0, 3] = -2.0
+    found = _sphere(then, np.eye(4), Box, np.array([10.0, 0.0, 0.0]))
+    np.testing.assert_allclose(found, [(-10.0, 2.0, 0.0, 3.0), (2.0, 0.0, 0.0, 0.0)])
+
+
+def test_bounced_light_far_from_what_moves_counts_for_more_pictures(scene, drafts):
+    """A small step of the cube changes little of the hemisphere of the floor's corners, and more beside it."""
+    for _ in range(14):
+        bpy.data.objects["Cube"].location.x += 0.02
+        frame = drafts()
+    counts = samples_behind(frame)
+    assert counts.max() > FEW + 3.0
+    assert ((counts > 0) & (counts <= FEW + 1.0)).mean() > 0.01
