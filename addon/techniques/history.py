@@ -8,19 +8,16 @@ of the same surface with its own fresh light:
 
 so that n pictures of a still surface have the error of n samples. The same surface is one that lies on the tangent
 plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees); n is multiplied by the share of
-the bilinear weights that is on it. What was hidden before has only fresh light. Indirect light is filtered over
-neighbours (film/neighbours.py) when it is joined, not before: over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24
-on not at all. On objects that move n is at most FEW, as it is for light straight from lamps where a moving object's box
-stands or stood before one of them; there it is kept within the spread of what is fresh on 5x5 pixels, so that shadows
-move along. (Everywhere, where the world or meshes shine.) Indirect light beside moving objects counts for as many
-pictures as leave the least error, by the share of the hemisphere that a step changes. While lamps move n is at most
-LAMPS, and less where a step changes more than LAG / LAMPS of their light. After any other edit (and while lamps of node
-trees move) there is no history at all (frame/history.py); what shines is never carried: it moves otherwise than its
-surface.
+the bilinear weights that is on it. Indirect light is filtered over neighbours (film/neighbours.py) when it is joined:
+over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. On objects that move n is at most FEW, as for
+light straight from lamps where a moving object's box stands or stood before one of them; there it is kept within the
+spread of what is fresh on 5x5 pixels. (Everywhere, where the world or meshes shine.) Beside moving objects indirect
+light counts for as many pictures as leave the least error, by the share of the hemisphere that a step changes. While
+lamps move n is at most LAMPS, and less where a step changes more than LAG / LAMPS of their light. After any other edit
+(and while lamps of node trees move) there is no history at all (frame/history.py); what shines is never carried.
 
 In drafts of the viewport, and, where `animation` says so, in final pictures of one sample drawn one after the other
-by one process; a picture then depends on those before it. Never in slices, with motion blur or where samples may end
-early: all machines would need the same past.
+by one process. Never in slices, with motion blur or where samples may end early: all machines would need one past.
 
 | cost | per picture |
 |---|---|
@@ -28,9 +25,8 @@ early: all machines would need the same past.
 | images | 4 RGBA32F of the picture's size, kept |
 
 Bias: light that changes as things move lags by up to FEW pictures, bounced light far from them by MANY, light of lamps
-that move by LAMPS; sharp shadows of
-moved cameras are looked up between pixels. Bounded by the tests above. Sources: Nehab et al. 2007 (reprojection);
-Schied et al. 2017 (SVGF: light without colour, tests of surfaces); Salvi 2016 (bounds by the spread of neighbours).
+that move by LAMPS; sharp shadows of moved cameras are looked up between pixels. Sources: Nehab et al. 2007
+(reprojection); Schied et al. 2017 (SVGF: light without colour, tests of surfaces); Salvi 2016 (bounds by neighbours).
 """
 
 from __future__ import annotations
