@@ -5,32 +5,30 @@
 #include "subsurface/image.glsl"
 #include "subsurface/lean.glsl"
 
-#define BESIDE 4        // points on either side along the curve on which they stand, whose leans are alike
+#define ALIKE 0.6       // cosine between normals of points from which on directions are alike
 #define AS_DIFFUSE 8.0  // walks that count as of a diffuse surface: few tell little of directions
 
 // How what leaves depends on the direction, as a share of the mean: sums over points that face alike by sums, since a single walk that
-// finds light says nothing of those that find none. The slope is that of a row of points; the lean changes within it.
+// finds light says nothing of those that find none. Light that comes straight through leaves in one direction for all of them, so
+// it is vectors that are added, `slope` along the normal and `lean` along the surface.
 vec3 slope_at(ivec2 texel, out mat3 lean)
 {
   vec3 normal = octahedral_decode(point_normal_fetch(texel).xy);
-  vec3 slope = vec3(0.0);
-  vec4 sloping = vec4(0.0);
-  vec4 leaning = vec4(0.0);
-  lean = mat3(0.0);
+  vec4 whole = vec4(0.0);
+  mat3 sums = mat3(0.0);
   for (int x = 0; x < ROW; x++) {
     ivec2 other = ivec2(x, texel.y);
-    float alike = smoothstep(0.5, 0.9, dot(octahedral_decode(point_normal_fetch(other).xy), normal));
-    vec4 sent = alike * cell_sent_fetch(other);
-    sloping += sent;
-    slope += alike * cell_slope_fetch(other).rgb;
-    if (abs(x - texel.x) <= BESIDE) {
-      leaning += sent;
-      lean += alike * mat3(cell_red_fetch(other).rgb, cell_green_fetch(other).rgb, cell_blue_fetch(other).rgb);
-    }
+    vec3 facing = octahedral_decode(point_normal_fetch(other).xy);
+    float alike = smoothstep(ALIKE, 0.5 + 0.5 * ALIKE, dot(facing, normal));
+    whole += alike * cell_sent_fetch(other);
+    vec3 along = cell_slope_fetch(other).rgb;
+    sums += alike * (mat3(cell_red_fetch(other).rgb, cell_green_fetch(other).rgb, cell_blue_fetch(other).rgb)
+                     + mat3(along.r * facing, along.g * facing, along.b * facing));
   }
-  vec3 per = vec3(leaning.w / (leaning.w + AS_DIFFUSE)) / max(leaning.rgb, vec3(1e-20));
-  lean = mat3(per.r * lean[0], per.g * lean[1], per.b * lean[2]);
-  return slope * (sloping.w / (sloping.w + AS_DIFFUSE)) / max(sloping.rgb, vec3(1e-20));
+  vec3 per = vec3(whole.w / (whole.w + AS_DIFFUSE)) / max(whole.rgb, vec3(1e-20));
+  vec3 slope = per * (normal * sums);
+  lean = mat3(per.r * sums[0] - slope.r * normal, per.g * sums[1] - slope.g * normal, per.b * sums[2] - slope.b * normal);
+  return slope;
 }
 
 void main()
