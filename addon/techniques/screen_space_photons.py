@@ -75,7 +75,7 @@ LIGHT, GLOSS = "radiance.diffuse_indirect", "radiance.glossy_indirect"
 LEAST_PIXELS = 0.8
 MAPS_APART = 4  # samples for which rays ask the same map: it costs as much as the picture's photons, and shows less
 INTERFACES = Param(
-    "interfaces", "Interfaces", 8,
+    "interfaces", "Interfaces", 16,
     "Number of glass or mirror surfaces after the first that a photon may meet before a diffuse surface",
     0, 32,
 )  # fmt: skip
