@@ -41,6 +41,7 @@ from .traced_triangles import (
     TINT_CODE,
     is_empty,
     is_met,
+    is_sheet,
     links_code,
     mean_code,
     mean_emission,
@@ -60,6 +61,8 @@ HIERARCHY_TEXTURES = (("RGBA32F", "trace_nodes"), ("RGBA32F", "trace_leaves"))
 LEAF_TEXELS = 17
 # For programs that trace rays among triangles with tiles; others are a tenth faster without.
 TILED = (("OPACITY_TILES", "1"),)
+OPACITY_TEXEL = 9
+SHEETS = (("GLASS_SHEETS", "1"),)  # where some glass is no closed solid
 TINTED, EMISSION_TEXEL = (("TINTED_LAYERS", "1"),), 10  # where some triangle colours light that passes it
 INSTANCED = (("INSTANCED", "1"),)  # and below an upper tree
 NO_TILES = np.zeros((0, 4), np.float32)
@@ -181,6 +184,7 @@ class Trees:
         leaves = images.upload_list(np.concatenate(texels) if len(texels) > 1 else texels[0])
         leaves.defines = (TILED if len(tiles) else ()) + (INSTANCED if len(copies) else ())
         leaves.defines += TINTED if any((tree.leaves[:, EMISSION_TEXEL] <= -TINT_CODE).any() for tree in own) else ()
+        leaves.defines += SHEETS if any(is_sheet(tree.leaves[:, OPACITY_TEXEL]).any() for tree in own) else ()
         self.upper = UpperTree(copies, np.asarray(origin, float)) if len(copies) else None
         rows = self._joined(copies, starts[1:]) if len(copies) else world.boxes.linked(0, self._first_leaf)
         shared = tuple(

@@ -16,12 +16,16 @@ import numpy as np
 from ..materials.compiled import CompiledMaterial
 from ..materials.energy import pane_passing
 from ..snapshot.scene import LAST_GROUP, Instance, Mesh
+from .culling import closed_triangles
 from .emission_maps import EmissionMaps, TriangleEmission
 from .opacity_maps import OpacityMaps, TriangleOpacity
 
 AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
 # Which rays a triangle stops: all, all but those to lights, those alone, all and those to lights for certain.
 ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
+ALONE = 0.99  # share of a material, from which on it is glass and nothing else
+ONE_SIDED = 0.25  # length of the sum of a sheet's faces, over their area
+SHEET = WHOLE_SHADOW  # of glass, which stops none for certain: all rays, by the side that they meet
 MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
 FRONT_ALONE = 0.25  # added to the material's number
 TINT_CODE = 1000.0  # taken from minus the colour of what passes, in the place of what is emitted
@@ -56,6 +60,7 @@ def world_triangles(
     shown = [one for one in instances if is_met(one, path) and meshes[one.mesh].triangle_count]
     total = sum(meshes[one.mesh].triangle_count for one in shown)
     corners, looks, made = np.empty((total, 3, 3), np.float32), np.empty((total, 8), np.float32), 0
+    sheets = _sheets(shown, meshes, materials)
     # Of instances with equal kinds all triangles look the same.
     matrices_of_all = np.array([one.matrix[:3] for one in shown], float).reshape(-1, 3, 4)
     turns = np.linalg.det(matrices_of_all[:, :, :3])
@@ -72,6 +77,8 @@ def world_triangles(
         known = maps.of(copies[0])
         if known is not None:
             _refine(look_of_triangle, of_triangle, materials, known, rays, bool(mirrored))
+        if rays == ALL_RAYS and not sheets.isdisjoint(slots):
+            _let_leave(look_of_triangle, of_triangle, materials, sheets, mesh, bool(mirrored))
         shining = glow.of(copies[0])
         if shining is not None:
             _shine(look_of_triangle, of_triangle, shining, bool(mirrored))
@@ -171,6 +178,47 @@ def _refine(
             glass = material.glass is not None
             sides = _of_glass(material, known.sides[own].mean(axis=-1)) if glass else known.sides[own]
             look[own, 0] = _codes(stopped, sides, mirrored, glass, known.tile[own])
+
+
+def _sheets(shown: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]) -> set[int]:
+    """Materials of glass of which one side is the inside of no solid, as that of a pool's surface. Two sheets that face
+    away from each other are a pane, whose light enters by one and leaves by the other: all open glass together must
+    face one way more than others."""
+    glass = {k for k, one in enumerate(materials) if one.glass is not None and one.glass.share > ALONE}
+    facing, area, found = np.zeros(3), 0.0, set()
+    for one in shown if glass else ():
+        if glass.isdisjoint(one.materials):
+            continue
+        mesh = meshes[one.mesh]
+        of_triangle = mesh.triangle_materials(one.materials)
+        own = ~closed_triangles(mesh) & np.isin(of_triangle, [*glass])
+        if own.any():
+            corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[own]]] @ one.matrix[:3, :3].T
+            across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            facing += across.sum(axis=0)
+            area += np.linalg.norm(across, axis=1).sum()
+            found.update(of_triangle[own].tolist())
+    return found if np.linalg.norm(facing) > ONE_SIDED * area else set()
+
+
+def _let_leave(
+    look: np.ndarray, of_triangle: np.ndarray, materials: list[CompiledMaterial], sheets: set[int], mesh: Mesh,
+    mirrored: bool,
+) -> None:  # fmt: skip
+    """Of open glass of `sheets` let pass from within what is left of even light there: it has spread over n2 as many
+    directions, and total reflection keeps the rest."""
+    size = SIDE_STEPS + 1
+    is_open = ~closed_triangles(mesh) & (np.abs(look[:, 0]) < MAPPED * size**2)
+    for number in sheets:
+        own = np.flatnonzero(is_open & (of_triangle == number))
+        passing = 1.0 - np.abs(look[own, 0]) % size / SIDE_STEPS  # of even light, the second side
+        leaving = passing / max(materials[number].glass.ior, 1.0) ** 2
+        look[own, 0] = -_codes(SHEET, 1.0 - np.stack([passing, leaving], axis=-1), mirrored, False)
+
+
+def is_sheet(codes: np.ndarray) -> np.ndarray:
+    """(...) whether these are codes of glass that is no closed solid."""
+    return (codes < 0) & (np.abs(codes) // (SIDE_STEPS + 1) ** 2 == SHEET)
 
 
 def mean_emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple[float, float, float], float]:

@@ -36,11 +36,11 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     if (!walk.has_met) {
       float t;
 #ifdef SMOOTH_MIRRORS
-      bool all = true;
+      bool unbounded = true;
 #else
-      bool all = walk.whole;
+      bool unbounded = walk.whole;
 #endif
-      if (!trace_vertex(walk.origin, walk.direction, all ? 1e29 : reach, roll.z, walk.met, t)) {
+      if (!trace_vertex(walk.origin, walk.direction, unbounded ? 1e29 : reach, roll.z, walk.met, t)) {
         break;
       }
       share = walk.whole ? 1.0 : max(1.0 - t * t / (reach * reach), 0.0);

@@ -13,6 +13,9 @@
 #include "ask/media.glsl"
 #include "ask/leaving.glsl"
 
+#if defined(GLASS_SHEETS) && !defined(SMOOTH_MIRRORS)
+#define SMOOTH_MIRRORS  // sheets of glass mirror from within
+#endif
 #define LAYERS_PASSED 16     // surfaces that a ray to a light goes through that they do not block
 
 struct Vertex {
@@ -147,6 +150,12 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
   met.mirror_alpha = -1.0;
   met.mirror_normal = met.normal;
   met.mirror_share = vec3(0.0);
+  // From below a sheet of water rays pass with the chance that light from there leaves it: all others it mirrors.
+  for (bool within = code > 0.5 && leaves_sheet(hit, met.position, direction); within; within = is_mirror = false) {
+    met.reflection.diffuse = vec3(0.0);
+    met.reflection.straight = met.reflection.grazing = met.mirror_share = vec3(1.0);
+    met.mirror_alpha = 0.0;
+  }
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
   for (; is_mirror; is_mirror = false) {
     met.mirror_alpha = max(code - 1.0, 0.0);

@@ -163,7 +163,8 @@ float tile_opacity(ivec2 hit, float code, bool front, vec3 position)
 
 // The share of rays that four triangles stop, met at the distances `t`, of those before `limit`. Codes are negative where the
 // triangle may also bend what meets it; they hold which rays it is about, 0: all, 1: not those that look for a light, 2:
-// those alone, 3: all, and those for certain; and the coverage of either side, or, if MAPPED, of which tile.
+// those alone, 3: all, and those for certain (glass: those that it is a sheet for, by the side that they meet); and the
+// coverage of either side, or, if MAPPED, of which tile.
 vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec4 facing, bool bent, bool shadow)
 {
   vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
@@ -172,7 +173,9 @@ vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction,
   vec4 front = floor(sides / SIDES);
   vec4 behind = sides - SIDES * front;
   vec4 covered = mix(behind, front, greaterThan(facing, vec4(0.0)));
-  covered = mix(covered, shadow ? front : behind, lessThan(code, vec4(0.0)));  // glass
+  vec4 glass = vec4(lessThan(code, vec4(0.0)));
+  vec4 last = vec4(equal(stopped, vec4(3.0)));
+  covered = mix(covered, shadow ? front : behind, glass * (vec4(1.0) - last));
   vec4 opacity = min(covered * (1.0001 / (SIDES - 1.0)), vec4(1.0));
 #ifdef OPACITY_TILES
   if (max(max(stopped.x, stopped.y), max(stopped.z, stopped.w)) >= MAPPED) {
@@ -188,7 +191,8 @@ vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction,
     opacity = mix(opacity, vec4(1.0), lessThan(code, vec4(0.0)));
   }
   opacity = mix(opacity, vec4(0.0), equal(stopped, vec4(shadow ? 1.0 : 2.0)));
-  return shadow ? mix(opacity, vec4(1.0), equal(stopped, vec4(3.0))) : opacity;
+  last = vec4(equal(stopped, vec4(3.0)));
+  return shadow ? mix(opacity, vec4(1.0), last * (vec4(1.0) - glass)) : opacity;
 }
 
 // A place in the tree: a node, or a leaf.
@@ -558,4 +562,12 @@ vec3 triangle_shading_normal(ivec2 hit, vec3 position)
   vec3 normal = (1.0 - place.x - place.y) * corner_normal(hit, 0) + place.x * corner_normal(hit, 1)
                 + place.y * corner_normal(hit, 2);
   return safe_normalize(normal);
+}
+
+// Whether a triangle is glass that is no closed solid, and a ray meets it from within.
+bool leaves_sheet(ivec2 hit, vec3 position, vec3 direction)
+{
+  float code = leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)];
+  bool sheet = code < 0.0 && floor(-code / (SIDES * SIDES)) == 3.0;
+  return sheet && dot(triangle_shading_normal(hit, position), direction) > 0.0;
 }

@@ -1,0 +1,31 @@
+"""Wide light on what lies under a single sheet of water: radiance passes its faces unscaled, as in Cycles."""
+
+import pytest
+
+from addon.compare.passes import light_paths
+from addon.materials.energy import pane_passing
+
+
+def pool(stage, index=1.33, albedo=0.5, turn=(0, 0, 0)):
+    """A wide ground below a sheet, under an even world of radiance 1, seen from above."""
+    stage.rectangle((-20, -20), (20, 20), z=-0.3, material=stage.diffuse(albedo))
+    glass = stage.material("ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0, IOR=index)
+    stage.rectangle((-20, -20), (20, 20), material=glass, turn=turn)
+    stage.world()
+    stage.camera_above(1.0, 2.0)
+
+
+def seen(stage, samples, engine="CANDELA"):
+    """Light of the ground through the sheet."""
+    return light_paths(stage.render(samples, (16, 16), engine=engine, bounces=24))["transmission_indirect"].mean()
+
+
+@pytest.mark.parametrize("index", [1.33, 1.5])
+def test_a_ground_below_water_has_the_light_that_faces_leave_and_mirror_back(stage, index):
+    """A ray from the ground passes with the chance t = (1 - F) / n2, F the reflectance of even light from outside, and
+    is mirrored back otherwise: B = t / (1 - (1 - t) albedo); total reflection has most of what is mirrored."""
+    pool(stage, index)
+    passing = pane_passing(index)[1] / index**2
+    radiance = 0.5 * passing / (1 - (1 - passing) * 0.5)
+    straight = 1 - ((index - 1) / (index + 1)) ** 2
+    assert seen(stage, 16) == pytest.approx(straight * radiance, rel=0.03)
