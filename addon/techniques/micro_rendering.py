@@ -8,32 +8,26 @@ Pixels of the buffer are equal shares of what the surface reflects, so light is 
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
-Where materials are glossy, points and nodes also have what their gloss sends of direct light: one lobe of von Mises and
-Fisher each, about where mirrors would send it, as a mean direction and a flux, both of which average over a tree
-(shaders/micro/lobes.frag.glsl). Light that photons answer for is left out of mirrors.
+Where gloss is, nodes have what it sends of direct light, too: a lobe of von Mises and Fisher about where mirrors would
+send it, as mean direction and flux, which average over a tree. What photons bring of mirrors is left out.
 
-Diffuse light is gathered by regions of the picture and interpolated as in multires_radiosity.py; lobes of microfacets
-by each pixel, whose micro-buffer has rays of the lobe. Groups of points gather further bounces for themselves. Each
-sample has other points and pixels turned and shifted differently.
+Diffuse light is gathered by regions and interpolated as in multires_radiosity.py; lobes of microfacets by each pixel,
+whose micro-buffer has rays of the lobe. Groups of points gather further bounces. Each sample has other points.
 
-Source: Ritschel, Engelhardt, Grosch, Seidel, Kautz, Dachsbacher 2009; Ritschel's thesis 2009, chapter 6. Ours:
-rectangles drawn by rays through the middles of pixels (there a group fills one pixel); both sides of points; medians of
-normals.
+Source: Ritschel, Engelhardt, Grosch, Seidel, Kautz, Dachsbacher 2009; Ritschel's thesis 2009, chapter 6. Ours: rays
+through the middles of pixels (there a group fills one pixel); both sides of points; gloss by direction.
 
 | cost | with n points, a region or pixel that gathers, K x K pixels |
 |---|---|
 | fetches, rays | 2 per visited node, some 10 K^2 if triangles are large; 2 n rays for each point of a light source |
-| bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
-| of gloss | 2 fetches for each pixel of a micro-buffer, 6 passes over points and nodes, 192 bytes a point |
+| bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point, 192 more with gloss (6 passes more, too) |
 | passes | 4 x `levels` + 2, and for each bounce 4; the tree in parts on Mesa (docs/micro_rendering.md) |
 
 Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). A kilometre of ground takes all points.
-
 Bias (diffuse and glossy indirect light): a piece sends the light of one place on it as far as nothing stands between
-(shaders/micro/clips.frag.glsl); of meshes with more triangles than half of the points the smallest have discs, which
-reach over edges: leaves, grass and hair below the points' spacing are wrong. A point's gloss has one lobe for all
-lamps, as wide as they lie apart, and reflects light that was bounced before as diffuse surfaces do. Sheen and
-translucent lobes get none, clear glass is not there, rough diffuse counts as Lambertian.
+(shaders/micro/clips.frag.glsl); of more triangles than half of the points the smallest have discs, which reach over
+edges: leaves, grass and hair are wrong. Gloss of a point has one lobe for all lamps, and is diffuse to bounced light.
+Sheen and translucent lobes get none, clear glass is not there.
 """
 
 from __future__ import annotations
