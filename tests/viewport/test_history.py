@@ -56,10 +56,11 @@ def test_pictures_of_a_moving_view_add_up(drafts):
     assert len({history.seeded(frame.settings, replace(frame.before, turn=k)).seed for k in range(1, 9)}) == 8
 
 
-def test_an_edit_of_a_lamp_gives_history_up(scene, drafts):
+@pytest.mark.parametrize(("name", "value"), [("energy", 2000.0), ("color", (1.0, 0.2, 0.1)), ("shadow_soft_size", 2.0)])
+def test_an_edit_of_a_lamp_gives_history_up(scene, drafts, name, value):
     drafts()
     drafts(moved=0.01)
-    next(one for one in scene.objects if one.type == "LIGHT").data.energy *= 2
+    setattr(next(one for one in scene.objects if one.type == "LIGHT").data, name, value)
     frame = drafts(moved=0.02)
     assert frame.before is None and samples_behind(frame).max() == 1.0
 
@@ -74,6 +75,22 @@ def test_a_lamp_that_moves_keeps_as_much_history_as_it_leaves_light_alike(scene,
     lamp.location.x += 50.0
     frame = drafts()
     assert samples_behind(frame).max() < 1.5
+
+
+def test_light_lags_by_three_steps_at_most_behind_a_lamp_that_moves(scene, drafts):
+    """As the lamp rises its light fades: what is shown has less of it than the scene had three steps before."""
+    lamp = next(one for one in scene.objects if one.type == "LIGHT")
+    height, light = lamp.location.z, {}
+    for joined in (True, False):
+        light[joined] = []
+        for k in range(8):
+            lamp.location.z = height + 0.1 * k
+            # After another setting there is no history.
+            frame = drafts(values={("instant_radiosity", "rays"): 2 if joined else 3 + k})
+            light[joined].append(float(images.read(frame.images["history.direct"])[..., :3].mean()))
+        assert (samples_behind(frame).max() > 1.0) == joined
+    assert np.all(np.diff(light[False][-4:]) < 0.0)
+    assert light[False][-1] < light[True][-1] < light[False][-4]
 
 
 def test_a_lamp_outruns_its_penumbra_where_three_steps_are_wider_than_it():
