@@ -2,12 +2,13 @@
 
 Programs of a scene take a driver seconds to compile. Those of a first look are one and the same for all scenes, so that
 a viewport has something to show at once, and again wherever an edit needs programs that are not there yet. The image
-beside it, the guide, tells surfaces apart: normal and inverse distance. A third one holds what surfaces and lamps emit
-towards the eye, so that a coarse picture in the pixels of the guide shows whole what is smaller than its own pixels.
+beside it, the guide, tells surfaces apart: normal and inverse distance. Where something emits, a third one holds what
+the eye sees of that: a coarse picture in the pixels of the guide so shows whole what is smaller than its own pixels.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,7 +18,7 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
 from ..materials.compiled import CompiledMaterial
-from ..scene.culling import calls
+from ..scene.culling import Call, calls
 from ..scene.geometry import SceneGeometry
 from ..scene.view import VIEW, View
 from ..snapshot.scene import Snapshot, World
@@ -43,10 +44,10 @@ FIRST_LOOK = Program(
     fragment="surface/first_look.frag.glsl",
     inputs=(("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance")),
     varyings=(("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal")),
-    outputs=(("VEC4", "out_look"), ("VEC4", "out_guide"), ("VEC4", "out_glow")),
+    outputs=(("VEC4", "out_look"), ("VEC4", "out_guide")),
     textures=(("RGBA32F", "instances"),),
     blocks=((VIEW, "film_view"), (LAMPS, "first_lamps")),
-    # flat_glow: radiance, of the side with the normal; w: what `out_glow` has for alpha, 0: the look shows it.
+    # flat_glow: radiance, of the side with the normal; w > 0: it alone is drawn in place of a look, with that alpha.
     constants=(("INT", "first_instance"), ("VEC4", "flat_color"), ("VEC4", "flat_glow"), ("VEC3", "flat_glow_behind")),
     defines=(
         ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
@@ -112,7 +113,8 @@ class FirstLook:
         self._view: Block | None = None
         self._lamps: Block | None = None
         self._sources = lights.Sources()
-        self._glows = False  # a surface that was drawn emits
+        self._glow: images.Image | None = None  # what surfaces emit, and lamps; alpha as of `flat_glow`
+        self._glows = False  # something is in it
         self._rows = np.zeros((4, 4))  # of the view
 
     @property
@@ -141,32 +143,51 @@ class FirstLook:
         self._lamps = _updated(self._lamps, LAMPS, lamps)
         if self._target is None or self._target.size != view.size:
             self.release()
-            formats = ("RGBA16F", "RGBA16F", "RGBA16F", "DEPTH_COMPONENT32F")
-            *colors, depth = (images.pool.take(*view.size, one) for one in formats)
-            self._target = images.Target(tuple(colors), depth)
+            formats = ("RGBA16F", "RGBA16F", "DEPTH_COMPONENT32F")
+            look, guide, depth = (images.pool.take(*view.size, one) for one in formats)
+            self._target = images.Target((look, guide), depth)
         self._target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
         images.Target((self._target.colors[0],)).clear((0.0,) * 4 if fills else background(snapshot))
         rows = self._rows = np.array([values[row] for row in ("row_x", "row_y", "row_w", "row_q")])
         self._glows = False
+        shown = [
+            call for call in calls(geometry.draws, np.flatnonzero(geometry.boxes.seen(rows)))
+            if not _is_left_out(materials[call.draw.material], guides)
+        ]  # fmt: skip
+        self._draw(self._target, shown, geometry, lambda k: _look_of(materials[k], guides, fills))
+        shining = [call for call in shown if guides and materials[call.draw.material].emissive]
+        if shining:
+            target = images.Target((self._begin_glow(), self.guide), self._target.depth)
+            self._draw(target, shining, geometry, lambda k: _glow_of(materials[k]))
+        return self._target.colors[0]
+
+    def _draw(
+        self, target: images.Target, shown: list[Call], geometry: SceneGeometry, look_of: Callable[[int], dict]
+    ) -> None:
+        """Draw meshes; `look_of`: constants by number of the material."""
         shader, material = passes.get(FIRST_LOOK), None
-        with passes.drawing(self._target):
-            for call in calls(geometry.draws, np.flatnonzero(geometry.boxes.seen(rows))):
-                shown = materials[call.draw.material]
-                if shown.bounds_alone or (guides and _lets_pass(shown) and shown.glass is None):
-                    continue
+        with passes.drawing(target):
+            for call in shown:
                 if material is None:
                     shader.bind(
                         textures={"instances": geometry.instances},
                         blocks={"film_view": self._view, "first_lamps": self._lamps},
-                        constants={"first_instance": call.first, **_look_of(shown, guides, fills)},
+                        constants={"first_instance": call.first, **look_of(call.draw.material)},
                     )
                 elif call.draw.material != material:
-                    shader.change(constants=_look_of(shown, guides, fills))
+                    shader.change(constants=look_of(call.draw.material))
                 material = call.draw.material
-                self._glows |= shown.emissive
                 shader.set_constant("first_instance", call.first)
                 passes.draw(shader, call.draw.batch, call.count)
-        return self._target.colors[0]
+
+    def _begin_glow(self) -> images.Image:
+        """The image of what emits, black where nothing is in it yet."""
+        if self._glow is None:
+            self._glow = images.pool.take(*self._target.size, "RGBA16F")
+        if not self._glows:
+            images.Target((self._glow,)).clear((0.0,) * 4)
+            self._glows = True
+        return self._glow
 
     def refined(self, coarse: images.Image, exposure: float, emitted: Emitted | None = None) -> images.Image:
         """A coarse picture of what was drawn last in the pixels of that: edges and shapes of the first look, and the
@@ -175,14 +196,16 @@ class FirstLook:
         if self._fine is None or self._fine.size != size:
             self._give_fine()
             self._fine = images.Target((images.pool.take(*size, "RGBA16F"),))
-        glow, glows = self._target.colors[2], emitted is not None and (self._add(emitted.lamps) or self._glows)
+        if emitted is not None:
+            self._add(emitted.lamps)
+        glows = emitted is not None and self._glows
         with images.borrowed(*coarse.size, "R32F") as shines:
             if glows:
                 finer = max(size[0] // coarse.size[0], 1)
-                passes.fullscreen(SHINES, shines, textures={"glow": glow}, constants={"finer": finer})
+                passes.fullscreen(SHINES, shines, textures={"glow": self._glow}, constants={"finer": finer})
             textures = {
-                "guide": self.guide, "look": self.picture, "coarse": coarse, "glow": glow, "shines": shines.colors[0],
-                "emission": emitted.image if glows else coarse,
+                "guide": self.guide, "look": self.picture, "coarse": coarse, "shines": shines.colors[0],
+                "glow": self._glow if glows else self.guide, "emission": emitted.image if glows else coarse,
             }  # fmt: skip
             constants = {
                 "faint": FAINT / max(exposure, 1e-6), "shows_glow": emitted.exposure if glows else 0.0,
@@ -191,17 +214,20 @@ class FirstLook:
             passes.fullscreen(FINE, self._fine, textures=textures, constants=constants)
         return self._fine.colors[0]
 
-    def _add(self, lamps: list[Emitter]) -> bool:
-        """Add lamps in view to what glows; whether there are any."""
-        seen = lights.traceable([one for one in lamps if _in_view(one, self._rows)])
-        if seen:
-            sources = self._sources.set([one.row(one.centre, 0, 0) for one in seen])
-            passes.fullscreen(
-                LAMPS_SEEN, images.Target((self._target.colors[2],)), blend="ADDITIVE_PREMULT",
-                textures={"guide": self.guide}, blocks={"film_view": self._view, "sources": sources},
-                constants={"light_count": len(seen)},
-            )  # fmt: skip
-        return bool(seen)
+    def _add(self, lamps: list[Emitter]) -> None:
+        """Add lamps in view to what emits."""
+        rows = {id(one): rows_seen(one, self._rows, self._target.size[1]) for one in lamps}
+        seen = lights.traceable([one for one in lamps if rows[id(one)] is not None])
+        if not seen:
+            return
+        low, high = zip(*(rows[id(one)] for one in seen))
+        passes.fullscreen(
+            LAMPS_SEEN, images.Target((self._begin_glow(),)), blend="ADDITIVE_PREMULT", rows=(min(low), max(high)),
+            textures={"guide": self.guide}, constants={"light_count": len(seen)},
+            blocks={
+                "film_view": self._view, "sources": self._sources.set([one.row(one.centre, 0, 0) for one in seen]),
+            },
+        )  # fmt: skip
 
     def fill_in(self, lit: images.Image, target: images.Target, *scene) -> None:
         """Into the target a picture that has direct light alone, with a faint light from the eye in its shadows.
@@ -217,6 +243,9 @@ class FirstLook:
     def release(self) -> None:
         """Give back the images."""
         self._give_fine()
+        if self._glow is not None:
+            images.pool.give(self._glow)
+            self._glow = None
         if self._target is not None:
             for image in (*self._target.colors, self._target.depth):
                 images.pool.give(image)
@@ -230,28 +259,49 @@ def _updated(block: Block | None, struct: Struct, values: dict) -> Block:
     return block
 
 
+def _is_left_out(material: CompiledMaterial, guides: bool) -> bool:
+    return material.bounds_alone or (guides and _lets_pass(material) and material.glass is None)
+
+
 def _lets_pass(material: CompiledMaterial) -> bool:
     return material.transparent and material.opacity < SOLID
 
 
 def _look_of(material: CompiledMaterial, guides: bool, fills: bool) -> dict[str, tuple[float, ...]]:
     solid = float(guides or not (_lets_pass(material) or material.glass is not None))
-    both = np.array([material.emission, material.emission_behind])
-    front, behind = np.zeros((2, 3)) if fills else np.clip(np.nan_to_num(both, posinf=1e4), 0.0, 1e4)
-    apart = (VARIED if material.uneven_emission else EVEN) if guides else 0.0
+    front, behind = np.zeros((2, 3)) if fills or guides else _radiance_of(material)
     return {
-        "flat_color": (*np.clip(material.color, 0.0, 1.0), solid), "flat_glow": (*front, apart),
+        "flat_color": (*np.clip(material.color, 0.0, 1.0), solid), "flat_glow": (*front, 0.0),
         "flat_glow_behind": tuple(behind),
     }  # fmt: skip
 
 
-def _in_view(lamp: Emitter, rows: np.ndarray) -> bool:
-    """Whether the box around a lamp may be in view. `rows`: (4, 4) of the view."""
+def _glow_of(material: CompiledMaterial) -> dict[str, tuple[float, ...]]:
+    """The same where it alone is drawn."""
+    front, behind = _radiance_of(material)
+    return {
+        "flat_color": (0.0, 0.0, 0.0, 1.0), "flat_glow": (*front, VARIED if material.uneven_emission else EVEN),
+        "flat_glow_behind": tuple(behind),
+    }  # fmt: skip
+
+
+def _radiance_of(material: CompiledMaterial) -> np.ndarray:
+    """(2, 3) that both sides emit."""
+    return np.clip(np.nan_to_num([material.emission, material.emission_behind], posinf=1e4), 0.0, 1e4)
+
+
+def rows_seen(lamp: Emitter, rows: np.ndarray, height: int) -> tuple[int, int] | None:
+    """Rows of pixels (from, to) that the box around a lamp may be seen in; None: none. `rows`: (4, 4) of the view."""
     if lamp.kind == SUN:
-        return True
+        return 0, height
     corners = lamp.centre + lamp.reach * np.array(list(product((-1.0, 1.0), repeat=3)))
     x, y, w, _ = rows @ np.column_stack((corners, np.ones(8))).T
-    return not any(np.all(beyond) for beyond in (w <= 0.0, x > w, x < -w, y > w, y < -w))
+    if any(np.all(beyond) for beyond in (w <= 0.0, x > w, x < -w, y > w, y < -w)):
+        return None
+    if np.any(w <= 0.0):
+        return 0, height
+    low, high = (np.clip((end(y / w) * 0.5 + 0.5) * height, 0, height) for end in (np.min, np.max))
+    return int(low), min(int(high) + 1, height)
 
 
 def background(snapshot: Snapshot) -> tuple[float, float, float, float]:

@@ -35,14 +35,16 @@ void main()
   }
   vec3 toward_eye = first_lamps.eye.w > 0.5 ? first_lamps.eye.xyz : normalize(first_lamps.eye.xyz - world_position);
   vec3 normal = normal_seen(toward_eye);
+  out_guide = vec4(normal, 1.0 / max(dot(film_view.eye.xyz - world_position, film_view.backward.xyz), 1e-6));
+  vec3 glow = min(dot(world_normal, toward_eye) < 0.0 ? flat_glow_behind : flat_glow.rgb, vec3(MOST));
+  if (flat_glow.w > 0.0) {  // it alone is drawn
+    out_look = dot(glow, vec3(1.0)) > 0.0 ? vec4(glow, flat_glow.w) : vec4(0.0);
+    return;
+  }
   vec3 irradiance = first_lamps.ambient.rgb + vec3(first_lamps.ambient.w * dot(normal, toward_eye));
   int count = int(first_lamps.count.x);
   for (int k = 0; k < count; k++) {
     irradiance += lamp_irradiance(k, normal);
   }
-  vec3 glow = dot(world_normal, toward_eye) < 0.0 ? flat_glow_behind : flat_glow.rgb;
-  vec3 shown = flat_color.rgb * irradiance * 0.31830989 + (flat_glow.w > 0.0 ? vec3(0.0) : glow);
-  out_look = vec4(min(shown, vec3(MOST)), 1.0);
-  out_guide = vec4(normal, 1.0 / max(dot(film_view.eye.xyz - world_position, film_view.backward.xyz), 1e-6));
-  out_glow = dot(glow, vec3(1.0)) > 0.0 ? vec4(min(glow, vec3(MOST)), flat_glow.w) : vec4(0.0);
+  out_look = vec4(min(flat_color.rgb * irradiance * 0.31830989 + glow, vec3(MOST)), 1.0);
 }
