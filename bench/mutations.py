@@ -22,6 +22,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -175,6 +176,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--files", metavar="N", type=int, default=drawn_mutations.MOST_TESTS,
         help="files of tests for each wrong that is drawn, the nearest first",
     )  # fmt: skip
+    parser.add_argument("--tests", metavar="ARGS", help="of those that are drawn: judge by these tests, as for pytest")
     parser.add_argument("--again", action="store_true", help="of those that were drawn, judge survivors anew")
     parser.add_argument("--equivalent", metavar="NAME", help="of those that were drawn, one that nothing can notice")
     parser.add_argument("--reason", metavar="TEXT", help="with --equivalent: why nothing can")
@@ -267,7 +269,8 @@ def command(options: argparse.Namespace) -> int:
                 continue
             if options.drawn:
                 files, fast = one.tests[: -len(drawn_mutations.FAST)], drawn_mutations.FAST
-                one = replace(one, tests=(*files[: options.files], *fast))
+                nearest = shlex.split(options.tests) if options.tests else files[: options.files]
+                one = replace(one, tests=(*nearest, *fast))
             state, by = judge(one, Path(folder), sound)
             before[one.name] = before.get(one.name, {}) | {"state": state, "by": by}
             print(f"{state:<9} {one.name:<52} {time.monotonic() - started:5.0f} s  {by}"[:200], flush=True)
