@@ -1,11 +1,15 @@
 """Meshes: what is read equals what Blender says of the same mesh, and broken geometry is mended or named."""
 
+from types import SimpleNamespace
+
 import bmesh
 import bpy
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
+from addon.snapshot.meshes import _drop_broken
 
 PENTAGON = [(np.cos(a), np.sin(a), 0) for a in np.linspace(0, 2 * np.pi, 5, endpoint=False)]
 
@@ -23,6 +27,16 @@ def test_positions_are_those_after_modifiers(stage):
     assert len(mesh.positions) == 9
     assert mesh.bounds_max[0] == pytest.approx(5.0)
     assert mesh.triangle_count == 3
+
+
+@pytest.mark.parametrize("index", [-1, 4])
+def test_a_triangle_of_a_vertex_that_is_not_there_is_dropped(index):
+    """Before the first one and after the last one."""
+    raw = SimpleNamespace(
+        positions=np.eye(4, 3, dtype=np.float32), corner_vertices=np.array([1, 2, 3, 1, 2, index], np.int32)
+    )
+    _, triangles, slots, dropped = _drop_broken(raw, np.arange(6).reshape(2, 3), np.array([0, 1]))
+    assert triangles.tolist() == [[0, 1, 2]] and slots.tolist() == [0] and dropped == 1
 
 
 def test_triangles_of_polygons_are_those_of_blender(stage):
