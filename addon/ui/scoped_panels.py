@@ -16,6 +16,7 @@ from ..frame.technique import CAMERA, LIGHT, MATERIAL, OBJECT, POINT, SCENE, WOR
 from ..techniques import REGISTRY
 from . import ENGINE
 from .properties import titled
+from .snapping import snapped
 from .texts import refusal
 
 # Tab of the Properties editor, and the context's name for the data-block that it shows.
@@ -301,7 +302,7 @@ def _writer(place: Place, gizmo):
         shown = bpy.context.object
         settings = place.settings(shown)
         if settings is not None:
-            setattr(settings, place.name, shown.matrix_world.inverted_safe() @ Vector(value))
+            setattr(settings, place.name, shown.matrix_world.inverted_safe() @ snapped(bpy.context, Vector(value)))
             drag.moved()
 
     return write
