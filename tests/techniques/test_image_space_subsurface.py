@@ -490,6 +490,17 @@ def test_walks_through_a_slab_are_plain_walks(stage, paths, color, behind):
     assert shown(stage.render(4, size=(24, 24))).mean() == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.parametrize(("color", "scale"), [(0.8, 1.0), (0.95, 3.0), (1.0, 10.0)])
+def test_light_skin_has_the_free_paths_of_cycles(stage, color, scale):
+    """Random Walk (Skin), light through a slab: 1.04, .82 and 4.6 of Cycles' with the limit of its twelve bisections."""
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), 1.0, scattering(stage, "RANDOM_WALK_SKIN", scale, color=(color,) * 3))
+    stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = 0.15
+    stage.light("SUN", energy=np.pi)
+    stage.camera((0, 0, -2), (np.pi, 0, 0), 0.05)
+    own, cycles = (shown(stage.render(n, size=(8, 8), engine=e)).mean() for n, e in ((16, "CANDELA"), (512, "CYCLES")))
+    assert own == pytest.approx(cycles, rel=0.03)
+
+
 def test_walks_in_a_white_body_under_an_even_world_lose_nothing(stage):
     sphere(stage, scattering(stage, "RANDOM_WALK", 0.3 * WALK, color=(1, 1, 1)), radius=1.0)
     stage.world((1, 1, 1))

@@ -8,8 +8,8 @@ from tests.techniques.test_image_space_subsurface import WALK, scattering, shown
 
 
 def test_light_that_comes_through_a_slab_reaches_the_floor_below(stage):
-    """A lamp above a slab of Random Walk (Skin), seen: the floor in its shadow. Cycles 5.2, 1024 samples: a diffuse
-    slab would leave .018 of it."""
+    """A lamp above a slab of Random Walk (Skin), seen: the floor in its shadow. Cycles 5.2, mean of three renders of 1024
+    samples, which differ by 3 % in red: a diffuse slab would leave .018 of it."""
     skin = scattering(stage, "RANDOM_WALK_SKIN", 2.0, radius=(1, 0.6, 0.3), color=(0.9, 0.7, 0.4))
     stage.rectangle((-1.5, -1.5), (1.5, 1.5), 1.0, material=skin)
     solid = stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY")
@@ -22,7 +22,7 @@ def test_light_that_comes_through_a_slab_reaches_the_floor_below(stage):
     pictures = [shown(stage.render(8, size=(24, 18), bounces=1, seed=seed)) for seed in range(3)]
     floor = np.mean(pictures, axis=0)[2:6, 8:16].mean(axis=(0, 1))
     print(f"floor {floor.round(4)}")
-    assert floor == pytest.approx((0.193, 0.306, 0.322), rel=0.1)
+    assert floor == pytest.approx((0.175, 0.286, 0.301), rel=0.1)
 
 
 def test_fog_is_lit_by_what_comes_through_wax(stage):
