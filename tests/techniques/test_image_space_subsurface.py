@@ -492,7 +492,7 @@ def test_walks_through_a_slab_are_plain_walks(stage, paths, color, behind):
 
 @pytest.mark.parametrize(("color", "scale"), [(0.8, 1.0), (0.95, 3.0), (1.0, 10.0)])
 def test_light_skin_has_the_free_paths_of_cycles(stage, color, scale):
-    """Random Walk (Skin), light through a slab: 1.04, .82 and 4.6 of Cycles' with the limit of its twelve bisections."""
+    """Random Walk (Skin), light through a slab: 1.04, .82 and 4.6 of Cycles' with the limit of its 12 bisections."""
     stage.rectangle((-1.5, -1.5), (1.5, 1.5), 1.0, scattering(stage, "RANDOM_WALK_SKIN", scale, color=(color,) * 3))
     stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = 0.15
     stage.light("SUN", energy=np.pi)

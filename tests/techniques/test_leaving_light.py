@@ -8,8 +8,8 @@ from tests.techniques.test_image_space_subsurface import WALK, scattering, shown
 
 
 def test_light_that_comes_through_a_slab_reaches_the_floor_below(stage):
-    """A lamp above a slab of Random Walk (Skin), seen: the floor in its shadow. Cycles 5.2, mean of three renders of 1024
-    samples, which differ by 3 % in red: a diffuse slab would leave .018 of it."""
+    """A lamp above a slab of Random Walk (Skin), seen: the floor in its shadow. Cycles 5.2, three renders of 1024
+    samples that differ by 3 % in red: a diffuse slab would leave .018 of it."""
     skin = scattering(stage, "RANDOM_WALK_SKIN", 2.0, radius=(1, 0.6, 0.3), color=(0.9, 0.7, 0.4))
     stage.rectangle((-1.5, -1.5), (1.5, 1.5), 1.0, material=skin)
     solid = stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY")
