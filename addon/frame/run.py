@@ -108,7 +108,8 @@ class Renderer:
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
         yield 0, 0  # a first look needs no more
-        self.materials.upload_textures()
+        if self.materials.upload_textures():
+            yield 0, 0  # these have programs of their own
         while isinstance(agreed := self.agrees(given, settings), int):
             self._untouched = not geometry_changed  # nothing else has been changed yet that the key does not hold
             yield 0, agreed

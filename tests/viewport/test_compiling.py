@@ -58,7 +58,10 @@ def test_first_look_comes_before_textures_are_drawn(cold):
     cold.draw()
     assert cold.viewport.looks and library.compile_count == compiled + 1
     cold.draw()
-    assert library.compile_count > compiled + 1
+    alone = library.compile_count
+    assert compiled + 1 < alone <= compiled + 5 and not cold.viewport.frame  # and then they alone
+    cold.draw()
+    assert library.compile_count > alone
 
 
 def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones(cold):
