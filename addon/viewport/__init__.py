@@ -127,10 +127,30 @@ def _painted(viewport: Viewport) -> bool:
     """Whether the scene has to be read for an image that is shown and not saved: scripts may have written into it, of
     which Blender tells nobody. Asked now and then."""
     now = time.monotonic()
-    if viewport.dirty or not viewport.settled or now < viewport.images_again:
+    if viewport.dirty or not viewport.settled:
+        return False
+    shown = any(one.is_dirty and whole_key(one.session_uid) in viewport.cache.images for one in bpy.data.images)
+    if now < viewport.images_again:
+        if shown:
+            _look_later(viewport, viewport.images_again - now)
         return False
     viewport.images_again = now + max(LOOK_AT_IMAGES_S, LOOK_SHARE * viewport.reading)
-    return any(one.is_dirty and whole_key(one.session_uid) in viewport.cache.images for one in bpy.data.images)
+    return shown
+
+
+def _look_later(viewport: Viewport, seconds: float) -> None:
+    """Draw again after that time: what was painted since the last look would else stay unseen until something else
+    draws the region."""
+    if viewport.looks_later:
+        return
+    viewport.looks_later = True
+
+    def look() -> None:
+        viewport.looks_later = False
+        if (engine := viewport.owner()) is not None:
+            engine.tag_redraw()
+
+    bpy.app.timers.register(look, first_interval=seconds)
 
 
 def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int]) -> None:

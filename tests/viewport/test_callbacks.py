@@ -1,6 +1,7 @@
 """Blender's side of the viewport: the engine's callbacks with a stand-in for what only a window has."""
 
 import time
+from types import SimpleNamespace
 
 import bpy
 import gpu
@@ -229,7 +230,7 @@ def test_pixel_size_of_blender_is_followed(window):
     assert viewport.pixel_size("AUTO") in (1, 2) and viewport.pixel_size("8") == 8
 
 
-def test_an_image_that_a_script_has_painted_is_read_with_the_next_redraw(window):
+def test_an_image_that_a_script_has_painted_is_read_with_the_next_redraw(window, monkeypatch):
     """Blender calls no `view_update` for it."""
     window.scene.candela.bounces, window.scene.candela.viewport_samples = 0, 1
     image = bpy.data.images.new("Painted", 4, 4)
@@ -255,3 +256,25 @@ def test_an_image_that_a_script_has_painted_is_read_with_the_next_redraw(window)
         window.draw(made)
         brightest.append(max(one.pixels[..., 0].max() for one in kept._snapshot.images.values()))
     assert brightest[0] == 0 and brightest[1] > 0
+    later = []
+    monkeypatch.setattr(viewport, "bpy", SimpleNamespace(
+        data=bpy.data, context=bpy.context, types=bpy.types,
+        app=SimpleNamespace(timers=SimpleNamespace(
+            register=lambda look, first_interval: later.append((look, first_interval)), is_registered=lambda _: True,
+            unregister=lambda _: None,
+        )),
+    ))  # fmt: skip
+    for _ in range(200):
+        window.draw(made)
+        if kept.settled:
+            break
+    image.pixels.foreach_set(np.full(64, 0.5, np.float32))
+    later.clear()
+    kept.looks_later, kept.images_again = False, time.monotonic() + 100.0
+    window.draw(made)  # too soon after the last look
+    window.draw(made)
+    ((look, seconds),) = later
+    assert 90.0 < seconds <= 100.0
+    made.redraws = 0
+    look()
+    assert made.redraws == 1
