@@ -26,9 +26,8 @@ smooth metal that lobe has direct light alone (near.glsl has the rest).
 
 Bias (diffuse and glossy indirect light): light that reaches less than about half a hundredth of the picture is missed
 where no probe comes near. A light for the area A in one of n samples is clamped at the distance sqrt(A / (pi n)); the
-loss falls with n. Gloss is spread evenly over the pixels that see it. Normals are the triangles', but for
-direct light on bumps and normal maps. Figures:
-docs/log/2026-11-26-indirect-light.md.
+loss falls with n. Gloss is spread evenly over the pixels that see it. Normals are the triangles', but for direct light
+on bumps and normal maps. Figures: docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
