@@ -11,6 +11,8 @@
 #include "ask/media.glsl"
 #include "ask/links.glsl"
 
+#define GOLDEN 0.618034
+
 // Share of the lobe's samples against `light_samples` of density `light_density` (power heuristic, beta = 2).
 float lobe_share(float lobe_density, float light_density, float light_samples)
 {
@@ -81,7 +83,8 @@ vec3 light_of_lobe(Surface s, ivec2 pixel, uvec3 salt)
   float kept_density = 0.0;
   for (int k = 0; k < count; k++) {
     vec3 weight;
-    vec3 direction = lobe_sample(lobe, vec2((u.x + float(k)) / float(count), u.y), weight);
+    vec2 of_candidate = vec2((u.x + float(k)) / float(count), fract(u.y + GOLDEN * float(k)));  // else all are in the tail at once
+    vec3 direction = lobe_sample(lobe, of_candidate, weight);
     if (max_component(weight) <= 0.0 || !may_mirror(s, direction)) {
       continue;
     }

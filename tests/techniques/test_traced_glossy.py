@@ -121,3 +121,15 @@ def test_what_has_no_material_traces_rays_where_it_is_glossy(stage):
     )
     assert (stage.ledger.row("traced_glossy").state == RAN) == shines.any()
     assert found.mean() == pytest.approx(shines.mean(), rel=0.02)
+
+
+def test_one_sample_of_an_even_world_has_no_dark_pixels(stage):
+    """The candidates of a pixel lie at several angles from the lobe's middle: all in its tail, where light samples have
+    most of the share, they left every tenth pixel at half of its light."""
+    stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.25, Color=(1, 1, 1, 1)))
+    stage.world((1, 1, 1))
+    stage.camera_above(1.0)
+    stage.scene.candela.use_denoise = False
+    light = stage.render(1, (32, 32), bounces=1)["glossy_direct"][..., 0]
+    assert light.mean() == pytest.approx(1.0, abs=0.01)
+    assert light.std() < 0.2 and light.min() > 0.5
