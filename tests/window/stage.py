@@ -71,11 +71,16 @@ def viewports():
     return list(candela()._viewports.values())
 
 
+def later(viewport):
+    """Whether it will look at unsaved images once more, which older versions do not."""
+    return getattr(viewport, "looks_later", False)
+
+
 def wait_for_rest():
     """Until every viewport is complete; yields."""
     yield 0.3
     started = time.monotonic()
-    while not (viewports() and all(one.done and not one.dirty for one in viewports())):
+    while not (viewports() and all(one.done and not one.dirty and not later(one) for one in viewports())):
         if any(one.error for one in viewports()):
             break
         if time.monotonic() - started > REST_TIMEOUT_S:
