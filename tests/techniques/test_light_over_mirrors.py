@@ -106,4 +106,4 @@ def test_light_by_way_of_mirrors_is_that_of_cycles(stage, scene):
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)
     if scene != "lit ring":  # footprints of photons reach through its wall
         dark = theirs < np.median(theirs[theirs > 0])
-        assert ours[dark].mean() == pytest.approx(theirs[dark].mean(), rel=0.08, abs=0.02 * theirs.mean())
+        assert ours[dark].mean() == pytest.approx(theirs[dark].mean(), rel=0.08, abs=0.02 * float(theirs.mean()))
