@@ -65,7 +65,7 @@ def _thrown_wide(
     plan: Plan, snapshot: Snapshot, settings: Settings, materials: Sequence[CompiledMaterial]
 ) -> Iterator[Note]:
     """Gloss that is narrower than the lobes of paths and no caustic: what it throws onto surfaces is blurred."""
-    if plan.filled.get("indirect", DIRECTED) == DIRECTED or settings.bounces <= 0:
+    if plan.filled.get("indirect") in (None, DIRECTED) or settings.bounces <= 0:
         return
     least = gloss.SMOOTH if "caustics" in plan.filled else 0.0
     names = []

@@ -8,6 +8,8 @@ and called for both neighbours; at the point itself the height is an ordinary va
 
 from __future__ import annotations
 
+import math
+
 from . import nodes
 from .atlas import PREFIX, atlas_key, keys_of, texture_layout
 from .attributes import asked_for
@@ -139,8 +141,7 @@ class Expressions:
         return image_functions(k, size, None, averages)
 
     def _size(self, key: str) -> tuple[int, int]:
-        height, width = self.images[key].pixels.shape[:2]
-        return width, height
+        return self.images[key].size
 
     def _shared_sampler(self) -> dict[str, str]:
         """The atlas for each image of those that share a sampler, the smallest ones: none where there are enough."""
@@ -153,7 +154,7 @@ class Expressions:
             return {}
         skies = {node.image for node in self.graph.nodes.values() if node.type == "ShaderNodeTexSky"}
         shared = [key for key in there if not self.images[key].tiles and key not in skies]
-        shared.sort(key=lambda key: (self.images[key].pixels.size, there.index(key)))
+        shared.sort(key=lambda key: (math.prod(self._size(key)), there.index(key)))
         shared = shared[: len(there) - MAX_IMAGES + 1]
         return dict.fromkeys(shared, atlas_key(shared))
 

@@ -107,7 +107,9 @@ class SnapshotCache:
     meshes: dict[str, MeshEntry] = field(default_factory=dict)
     images: dict[str, ImageEntry] = field(default_factory=dict)
     graphs: dict[str, GraphEntry] = field(default_factory=dict)
-    stands_in: bool = False  # images of bytes are not read: others stand in for them, whose programs are the same
+    stands_in: bool = (
+        False  # images of bytes are not read: small ones stand in for them, which mostly need the same programs
+    )
     culls: bool = False  # whether these leave out the backs of materials as EEVEE does
     volumes: dict[str, tuple[tuple, Volume]] = field(default_factory=dict)  # with the state they were read in
     facts: dict[tuple[int, int, int], object] = field(default_factory=dict)  # ObjectFacts by uid, parent's, data's

@@ -12,6 +12,7 @@ import re
 import struct
 import tempfile
 from pathlib import Path
+from typing import BinaryIO
 
 import bpy
 import numpy as np
@@ -19,6 +20,8 @@ import numpy as np
 from .exr import ExrError, read_exr
 
 FIRST_TILE = 1001  # UDIM
+HEAD = 32  # bytes of a file that say what it is
+FRAMES_OF_JPEG = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # markers of segments with the size
 MOST_AT_ONCE = 1 << 23  # numbers of an image that are summed in double precision at a time
 
 
@@ -68,12 +71,25 @@ def tile_path(path: str, number: int) -> str:
     return path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{index % 10 + 1}_v{index // 10 + 1}")
 
 
-def channels_of_bytes(head: bytes) -> int:
-    """Channels of a file that Blender holds as bytes, by its first 32 bytes: of PNG with 8 bits or fewer and of JPEG. 0
-    for any other."""
+def shape_of_bytes(file: BinaryIO) -> tuple[int, int, int] | None:
+    """Width, height and channels of a file that Blender holds as bytes, by its head: of PNG with 8 bits or fewer and of
+    JPEG. None for any other."""
+    head = file.read(HEAD)
     if head[:8] == b"\x89PNG\r\n\x1a\n" and len(head) > 25 and head[24] <= 8:
-        return {0: 1, 2: 3, 3: 4, 4: 2, 6: 4}.get(head[25], 0)
-    return 3 if head[:3] == b"\xff\xd8\xff" else 0
+        channels = {0: 1, 2: 3, 3: 4, 4: 2, 6: 4}.get(head[25])
+        return (*struct.unpack(">2I", head[16:24]), channels) if channels else None
+    if head[:3] != b"\xff\xd8\xff":
+        return None
+    at = 2
+    while True:  # segments of a JPEG file: marker, length, content; one of them is the frame's
+        file.seek(at)
+        segment = file.read(9)
+        if len(segment) < 9 or segment[0] != 0xFF:
+            return None
+        if segment[1] in FRAMES_OF_JPEG:
+            height, width = struct.unpack(">2H", segment[5:])
+            return width, height, 3
+        at += 2 + struct.unpack(">H", segment[2:4])[0]
 
 
 def read_file(path: str, space: str) -> np.ndarray | None:

@@ -8,6 +8,7 @@ that no shader decodes are converted here.
 
 from __future__ import annotations
 
+import io
 import time
 import zlib
 from dataclasses import dataclass
@@ -23,12 +24,12 @@ from ..materials.ies import Profile, profile_pixels
 from ..materials.sky import Sky, working_sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
 from .image_files import (
-    channels_of_bytes,
     frame_of,
     read_file,
     read_layer,
     scaled,
     sequence_path,
+    shape_of_bytes,
     tile_path,
     to_scene_linear,
     turn_movie,
@@ -41,8 +42,7 @@ PROFILES_FADE = bpy.app.version < (5, 0)  # see materials/ies.py
 # Cycles before Blender 5.1: bytes have straight alpha and floats premultiplied alpha, whatever their alpha mode says.
 BYTES_ARE_STRAIGHT = FLOATS_ARE_PREMULTIPLIED = bpy.app.version < (5, 1)
 LOOK_S = 5e-8  # between two looks at a file that is newer than its pixels, per number: some ten times what one takes
-STAND_IN = 8  # pixels a side of what stands in for an image; they vary, and so does their alpha
-HEAD = 64  # bytes of a file that say what it is
+STAND_IN = 8  # pixels a side of what stands in for an image; they vary
 MAGENTA = (1.0, 0.0, 1.0, 1.0)  # what Cycles shows for an image that is not there
 
 
@@ -55,6 +55,7 @@ class ImageTable:
         self.notes: list[Note] = []
         self.read = self.reused = 0
         self._cache, self._frame = cache, frame
+        self._with_alpha: set[int] | None = None  # session_uids of images whose alpha is read; asked for stand-ins only
 
     def key_of(self, image, user=None) -> str:
         """Image.key of a data-block, which is read at most once per sync.
@@ -62,8 +63,8 @@ class ImageTable:
         `user` (ImageUser) says which frame of a sequence is meant, and which pass of a multilayer file.
         """
         original = image.original or image
-        if self._cache.stands_in and (channels := byte_channels(original)):
-            return self._stand_in(whole_key(original.session_uid), original, channels)
+        if self._cache.stands_in and (shape := byte_shape(original)):
+            return self._stand_in(whole_key(original.session_uid), original, shape)
         dropped = not original.has_data  # as by Reload: asking for anything then loads the file
         part = _part(original, user, self._frame)
         key = whole_key(original.session_uid) + (f" {part}" if part else "")
@@ -99,11 +100,18 @@ class ImageTable:
             self.images[key] = Image(key, 0, pixels, "LINEAR", "NONE", "IES")
         return key
 
-    def _stand_in(self, key: str, original, channels: int) -> str:
+    def _stand_in(self, key: str, original, shape: tuple[int, int, int]) -> str:
+        """Opaque, unless the file has alpha and some node's Alpha is linked, which is seldom done for one that is 1."""
         pixels = np.ones((STAND_IN, STAND_IN, 4), np.float32)
-        pixels[::2, :, : min(channels, 4)] = 0.25
+        pixels[::2, :, :3] = 0.25
+        if self._with_alpha is None:
+            self._with_alpha = _with_alpha()
+        if shape[2] in (2, 4) and original.session_uid in self._with_alpha:
+            pixels[::2, :, 3] = 0.25
         shown, encoding, alpha, bits = _as_shown(original, None, pixels, False, False)
-        self.images[key] = Image(key, next_version(), shown, encoding, alpha, original.name, bits=bits)
+        self.images[key] = Image(
+            key, next_version(), shown, encoding, alpha, original.name, bits=bits, stands_for=shape[:2]
+        )
         return key
 
     def _read(self, key: str, original, part: Part, old: ImageEntry | None, loaded: bool) -> ImageEntry:
@@ -149,20 +157,33 @@ def _as_shown(original, part: Part, pixels: np.ndarray, missing: bool, is_float:
     return pixels, encoding, alpha, 8 if as_stored else 32 if original.colorspace_settings.is_data else 16
 
 
-def byte_channels(original) -> int:
-    """Channels of an image of bytes in one piece, as far as that is known without loading it; else 0."""
+def byte_shape(original) -> tuple[int, int, int] | None:
+    """Width, height and channels of an image of bytes in one piece, as far as they are known without loading it."""
     if original.type != "IMAGE" or original.source not in ("FILE", "GENERATED"):
-        return 0
+        return None
     if original.has_data:
-        return 0 if original.is_float else original.channels
+        return None if original.is_float else (*original.size, original.channels)
     packed = original.packed_file
     try:
         if packed is not None:
-            return channels_of_bytes(packed.data[:HEAD])
-        with Path(_path(original)).open("rb") as file:
-            return channels_of_bytes(file.read(HEAD))
+            return shape_of_bytes(io.BytesIO(packed.data))
+        path = Path(_path(original))
+        if not path.is_file():  # to open a pipe would wait
+            return None
+        with path.open("rb") as file:
+            return shape_of_bytes(file)
     except OSError:
-        return 0
+        return None
+
+
+def _with_alpha() -> set[int]:
+    """session_uids of images whose alpha some node tree reads."""
+    owners = (*bpy.data.materials, *bpy.data.worlds, *bpy.data.lights)
+    trees = (*bpy.data.node_groups, *(owner.node_tree for owner in owners if owner.node_tree is not None))
+    return {
+        node.image.session_uid for tree in trees for node in tree.nodes
+        if node.bl_idname == "ShaderNodeTexImage" and node.image is not None and node.outputs["Alpha"].is_linked
+    }  # fmt: skip
 
 
 def _is_stale(entry: ImageEntry, state: tuple) -> bool:

@@ -181,6 +181,12 @@ class Image:
     # Of a UDIM image: number of each tile, where it stands in `pixels` (x, y from the lower left) and its size.
     tiles: tuple[tuple[int, int, int, int, int], ...] = ()
     bits: int = 32  # a channel of the GPU's copy needs: 8 of bytes, 16 of colours, 32 of other numbers
+    stands_for: tuple[int, int] | None = None  # width and height of the image that small pixels stand in for
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels, as they stand in programs (materials/expressions.py)."""
+        return self.stands_for or self.pixels.shape[1::-1]
 
 
 @dataclass(frozen=True)

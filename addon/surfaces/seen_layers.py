@@ -14,6 +14,7 @@ where all of the media lie behind a layer.
 
 from __future__ import annotations
 
+import weakref
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -37,7 +38,7 @@ class SeenLayers:
 
     def __init__(self):
         self._image: images.Image | None = None
-        self._of: tuple[int, int] | None = None
+        self._of: tuple[weakref.ref[Frame], int] | None = None  # picture and sample that the image is of
 
     def position(self, frame: Frame, technique: Technique) -> images.Image:
         """surface.position, beside which `view_layers` lies where some material colours what passes it."""
@@ -47,9 +48,9 @@ class SeenLayers:
         if self._image is None or self._image.size != frame.size:
             self.release()
             self._image = images.pool.take(*frame.size, "RGBA32F")
-        if self._of != (id(frame), frame.sample):
+        if self._of is None or self._of[0]() is not frame or self._of[1] != frame.sample:
             self._draw(frame, technique, position)
-            self._of = (id(frame), frame.sample)
+            self._of = weakref.ref(frame), frame.sample
         return replace(position, beside={**position.beside, "view_layers": self._image})
 
     def _draw(self, frame: Frame, technique: Technique, position: images.Image) -> None:

@@ -114,7 +114,7 @@ class TemporalGlare(Technique):
         return scatter.MEASURE, scatter.BLOCKS, *few  # what else there is may never be needed
 
     def looks_at(self, settings: Settings) -> tuple[str, ...]:
-        few = settings.samples < scatter.UNLIMITED or settings.schedule.shows_each
+        few = settings.samples < scatter.UNLIMITED or settings.schedule.shows_each or settings.schedule.is_draft
         return tuple(STRAIGHT.values()) if few else ()
 
     def show(self, frame: Frame) -> None:

@@ -169,17 +169,16 @@ class VolumeCaustics(Technique):
                 },
             )  # fmt: skip
             yield
-            shader = passes.get_for(BEAMS, media.media.textures)
+            read = {**surfaces, **media.media.textures}
+            shader = passes.get_for(BEAMS, read)
+            read |= surfaces["surface_position"].beside
             with passes.drawing(
                 frame.target("radiance.volume_indirect"), blend="ADDITIVE_PREMULT", depth_test="NONE", depth_write=False
             ):
                 for k in range(STRETCHES):
                     start, end, flux = traced[3 * k : 3 * k + 3]
                     shader.bind(
-                        textures={
-                            "beam_starts": start, "beam_ends": end, "beam_fluxes": flux, **surfaces,
-                            **media.media.textures,
-                        },
+                        textures={"beam_starts": start, "beam_ends": end, "beam_fluxes": flux, **read},
                         blocks={"film_view": frame.view_block},
                         constants={"ray_side": side, "beam_pixels": BEAM_PIXELS, "beam_most_pixels": MOST_PIXELS},
                     )  # fmt: skip

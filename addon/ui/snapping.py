@@ -30,8 +30,9 @@ def on_surface(depsgraph: bpy.types.Depsgraph, eye: Vector, place: Vector, corne
     hit, location, _, face, thing, matrix = depsgraph.scene.ray_cast(depsgraph, eye, (place - eye).normalized())
     if not hit:
         return place
-    if corners and thing.type == "MESH":
-        mesh = thing.evaluated_get(depsgraph).data
+    mesh = thing.evaluated_get(depsgraph).data
+    # In Edit Mode the ray meets faces of the edited mesh, which the evaluated one may not have.
+    if corners and thing.type == "MESH" and face < len(mesh.polygons):
         vertices = [matrix @ mesh.vertices[k].co for k in mesh.polygons[face].vertices]
         nearest = min(vertices, key=lambda corner: (corner - location).length)
         if (nearest - location).length < REACH * (location - eye).length:

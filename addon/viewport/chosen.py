@@ -1,8 +1,10 @@
 """What is compiled before anybody looks: when this engine is chosen for a scene in a window, or a file is opened that
 has it, the other process (ahead.py) begins with what a 3D region would show if it were switched to Rendered.
 
-The scene is read once more for that, and in one go, so large ones are left alone. Programs do not depend on what images
-show: where there are large ones, others stand in for those of bytes, which are neither loaded nor handed over.
+The scene is read once more for that, and in one go, so large ones are left alone. Programs mostly do not depend on what
+images show: where there are large ones, small ones stand in for those of bytes, which are neither loaded nor handed
+over. Where a program does depend on it (an emission that is black, a metallic that is 0 all over), the view compiles
+its own.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from ..film import catcher
 from ..snapshot import SnapshotCache, camera_of_view, take
 from ..snapshot.camera import panoramic_view
 from ..snapshot.hair import hair_systems, point_count
-from ..snapshot.images import byte_channels
+from ..snapshot.images import byte_shape
 from ..ui import ENGINE
 from ..ui.properties import settings_of
 from ..ui.viewport_pass import shown_pass
@@ -26,7 +28,9 @@ from . import _ahead, _viewports, closes_eyes, compiles_ahead, hidden_in, looked
 SOON_S = 0.3  # Blender has evaluated the scene by then
 # Of a scene that is read for this: some tenths of a second. Objects are counted with instances, faces with modifiers.
 MOST_OBJECTS, MOST_FACES = 2000, 500_000
-MOST_PIXELS = 1 << 24  # of images; so many of those for which none can stand in
+# Pixels of images: above it, small images stand in; above it in images that nothing can stand in for, nothing is
+# compiled ahead.
+MOST_PIXELS = 1 << 24
 HAIR = 8  # faces that take as long as a point of particle hair, each of which is asked of Blender
 UNKNOWN_PIXELS = 1 << 22  # of an image that is not loaded: to ask for its size would load it
 
@@ -116,7 +120,7 @@ def _is_large(depsgraph) -> bool:
 
 
 def _has_large_images() -> bool:
-    return sum(_pixels(one) for one in bpy.data.images if not byte_channels(one)) > MOST_PIXELS
+    return sum(_pixels(one) for one in bpy.data.images if not byte_shape(one)) > MOST_PIXELS
 
 
 def _pixels(image) -> int:

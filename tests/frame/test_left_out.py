@@ -146,6 +146,7 @@ def test_gloss_that_is_thrown_wider_than_it_is_is_named(monkeypatch, inputs, sai
     assert (
         left_out.notes_of(plan, scene, FEW, [material])
         == left_out.notes_of(Plan((), (), {}), scene, some, [material])
+        == left_out.notes_of(Plan((), (), {"indirect": None}), scene, some, [material])
         == ()
     )
 

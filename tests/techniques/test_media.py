@@ -307,7 +307,6 @@ def of_corners(seen):
     return seen[[2, 2, 5, 5], [2, 5, 2, 5], 0].mean()
 
 
-@pytest.mark.slow
 def test_light_of_media_is_spread_by_its_guide_and_stays_where_that_met_nothing(stage):
     """Behind a slab of even opacity: light over opacity of the pixel that is known, times what the guide has here over
     what it has there, but at most eight times as much, in the channels where it has met anything."""
@@ -342,6 +341,7 @@ def test_light_of_media_is_spread_by_its_guide_and_stays_where_that_met_nothing(
     assert direct[4, 4, :3] == pytest.approx(np.where(there > 0, light, light * share), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
 def test_airlight_is_the_same_at_any_size(stage, scale):
     lit_cube(stage, scale)

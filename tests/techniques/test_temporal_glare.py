@@ -6,8 +6,11 @@ import pytest
 
 from addon.eye import optics, pupil, spectrum
 from addon.frame.ledger import RAN, SKIPPED
+from addon.frame.schedule import FINAL
+from addon.frame.settings import Settings
 from addon.gfx import images as gpu_images
 from addon.gfx import library
+from addon.techniques.temporal_glare import TemporalGlare
 
 SIZE = (72, 54)
 
@@ -26,6 +29,14 @@ def night(stage):
     settings.eye_side, settings.glare_magnification = "128", 100.0  # of a picture of few pixels
     stage.scene.frame_set(24)
     return stage
+
+
+def test_drafts_ask_for_what_tells_fireflies_however_many_samples_the_picture_at_rest_has():
+    """A draft shows one sample."""
+    glare = TemporalGlare()
+    many = Settings(samples=32, schedule=FINAL)
+    assert glare.looks_at(many) == ()
+    assert glare.looks_at(many.as_draft()) == glare.looks_at(Settings(samples=1)) != ()
 
 
 def glare_row(stage):

@@ -56,6 +56,20 @@ def test_neither_rays_nor_pixels_change_a_beam(stage):
     assert list(found.values()) == pytest.approx([found[128, 32]] * 4, rel=0.02)
 
 
+def test_beams_behind_a_coloured_pane_have_its_colour(stage):
+    color, found = (1.0, 0.5, 0.1), []
+    for tint in ((1, 1, 1), color):
+        stage.clear()
+        lens_scene(stage, 1.5)
+        beams_alone(stage)
+        stage.scene.candela.volume_caustics_rays = 32
+        pane = stage.material("ShaderNodeBsdfTransparent", Color=(*tint, 1))
+        stage.rectangle((-9, -9), (9, 9), material=pane, location=(0, -3, 0), turn=(np.pi / 2, 0, 0))
+        found.append(stage.render(2, size=(16, 16), bounces=1)["volume_indirect"][..., :3].mean((0, 1)))
+    assert found[0].min() > 0
+    assert found[1] / found[0] == pytest.approx(np.array(color), rel=0.03)
+
+
 def beams_of_a_ball(density, ior=1.5, pixels=64, span=6.0, rays=60_000, bounces=3):
     """(pixels, pixels) radiance that a ball of radius 1 in a cube of fog throws into it under a sun of irradiance 1,
     seen from the side: rays by Snell and Fresnel, with those mirrored inside up to `bounces` times. Row 0 is low."""

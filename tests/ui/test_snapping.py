@@ -32,6 +32,18 @@ def test_a_point_goes_to_the_surface_or_corner_that_is_seen_there(table, place, 
     assert tuple(found) == pytest.approx(expected, abs=1e-4)
 
 
+def test_a_face_of_a_mesh_that_is_edited_and_not_evaluated_yet_has_no_corners(table):
+    """In Edit Mode Blender tells faces that the evaluated mesh does not have."""
+    bpy.context.view_layer.objects.active = table
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        found = on_surface(depsgraph, Vector((0, 0, 5)), Vector((0.475, 0.48, 3.0)), True)
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    assert tuple(found) == pytest.approx((0.95, 0.96, 1.0), abs=1e-4)
+
+
 @pytest.mark.parametrize("magnet", [False, True])
 def test_without_the_magnet_or_a_view_a_point_stays(table, magnet):
     bpy.context.scene.tool_settings.use_snap = magnet

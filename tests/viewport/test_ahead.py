@@ -18,6 +18,7 @@ from addon.frame.run import Renderer
 from addon.gfx import device, images, library
 from addon.materials.graph import Graph, Node
 from addon.snapshot import SnapshotCache, take
+from addon.snapshot.images import byte_shape
 from addon.snapshot.scene import Image, Material
 from addon.surfaces import first_look
 from addon.techniques import make_registry
@@ -351,26 +352,50 @@ def test_large_scenes_are_told_without_reading_them(scene, monkeypatch, tmp_path
     assert not is_large()
 
 
-@pytest.mark.parametrize("ending", ["PNG", "JPEG"])
-def test_images_of_bytes_are_neither_loaded_nor_too_many(scene, region, tmp_path, ending):
-    """What stands in for them needs the programs that they need."""
-    sockets = ("Base Color", "Roughness", "Metallic", "Emission Color", "Normal")
+def test_a_pipe_among_the_images_is_not_opened(scene, tmp_path):
+    os.mkfifo(tmp_path / "pipe.png")
+    image = bpy.data.images.new("Pipe", 4, 4)
+    image.source, image.filepath_raw = "FILE", str(tmp_path / "pipe.png")
+    assert not image.has_data and byte_shape(image) is None
+
+
+def written(path, ending: str, size: tuple[int, int], alpha: bool) -> bpy.types.Image:
+    """A file of noise, opaque without `alpha`, as a data-block that is not loaded yet."""
+    image = bpy.data.images.new("Written", *size, alpha=True)
+    pixels = np.random.default_rng(1).random((size[0] * size[1], 4), np.float32)
+    pixels[:, 3] = pixels[:, 3] if alpha else 1.0
+    image.pixels.foreach_set(pixels.ravel())
+    image.filepath_raw, image.file_format = str(path), ending
+    image.save()
+    bpy.data.images.remove(image)
+    return bpy.data.images.load(str(path))
+
+
+@pytest.mark.parametrize(
+    ("ending", "cut_out", "further"), [("PNG", True, 0), ("PNG", False, 0), ("PNG", False, 14), ("JPEG", True, 0)]
+)
+def test_images_of_bytes_are_neither_loaded_nor_too_many(scene, region, tmp_path, ending, cut_out, further):
+    """What stands in for them needs the programs that they need: of a cut-out, of opaque files with alpha, and of more
+    images than samplers, of several sizes."""
+    sockets = ("Base Color", "Roughness", "Metallic", "Emission Color", "Normal", *(("Alpha",) if cut_out else ()))
     material = material_named("Textured")
     nodes, links = material.node_tree.nodes, material.node_tree.links
-    for socket in (*sockets, "Alpha"):
-        written = bpy.data.images.new("Written", 16, 16, alpha=True)
-        written.pixels.foreach_set(np.random.default_rng(1).random(16 * 16 * 4, np.float32))
-        written.filepath_raw, written.file_format = str(tmp_path / f"{socket}.{ending.lower()}"), ending
-        written.save()
-        bpy.data.images.remove(written)
+    for socket in sockets:
         image = nodes.new("ShaderNodeTexImage")
-        image.image = bpy.data.images.load(str(tmp_path / f"{socket}.{ending.lower()}"))
+        image.image = written(tmp_path / f"{socket}.{ending.lower()}", ending, (16, 16), socket == "Alpha")
         links.new(image.outputs["Alpha" if socket == "Alpha" else "Color"], nodes["Principled BSDF"].inputs[socket])
+    for number in range(further):
+        mixed, image = nodes.new("ShaderNodeVectorMath"), nodes.new("ShaderNodeTexImage")
+        image.image = written(tmp_path / f"{number}.png", ending, (8 + number, 40 - number), False)
+        into = nodes["Principled BSDF"].inputs["Base Color"]
+        links.new(into.links[0].from_socket, mixed.inputs[0])
+        links.new(image.outputs["Color"], mixed.inputs[1])
+        links.new(mixed.outputs[0], into)
     bpy.data.objects["Cube"].data.materials.append(material)
     depsgraph = region.depsgraph
     assert not chosen._is_large(depsgraph)
     foreseen = take(depsgraph, SnapshotCache(stands_in=True), 96, 64, view=region.camera)
-    assert len(foreseen.images) == 6 and not any(one.has_data for one in bpy.data.images)
+    assert len(foreseen.images) == len(sockets) + further and not any(one.has_data for one in bpy.data.images)
     real = take(depsgraph, SnapshotCache(), 96, 64, view=region.camera)
     assert all(one.has_data for one in bpy.data.images if one.users)
     settings, found = settings_of(scene, viewport=True), []
