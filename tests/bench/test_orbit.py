@@ -1,5 +1,6 @@
 """What drafts of a moving view are compared with."""
 
+import bpy  # noqa: F401 (gpu is its)
 import numpy as np
 import pytest
 
