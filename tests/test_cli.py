@@ -133,6 +133,7 @@ def test_bad_usage_is_refused_before_the_file_is_opened(arguments, words, tmp_pa
         (("--set", "samples"), ["name=value"]),
         (("--set", "relief.steps=300"), ["relief.steps", "material"]),
         (("--scene", "Nowhere"), ["Nowhere", "Cornell Box"]),
+        (("--scene", "\udcff"), ["There is no scene", "Cornell Box"]),  # a byte that is no UTF-8
         (("--view-layer", "Nothing"), ["Nothing", "ViewLayer"]),
         (("--output", "picture.gif"), [".png", "picture.gif"]),
     ],

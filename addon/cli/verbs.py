@@ -112,8 +112,11 @@ def open_mainfile(path: Path, run_scripts: bool = False) -> str:
 
 
 def _named(kind: str, name: str | None, among):
-    if name is None or name in among:
-        return among[name] if name is not None else None
+    if name is None:
+        return None
+    for thing in among:  # not `name in among`, which takes no bytes that are no UTF-8
+        if thing.name == name:
+            return thing
     known = ", ".join(f"'{thing.name}'" for thing in among)
     raise Refused(f"There is no {kind} '{name}'; there is {known}.", USAGE)
 
