@@ -46,6 +46,7 @@ from .traced_triangles import (
     mean_code,
     mean_emission,
     rays_met,
+    sheets_of,
     world_triangles,
 )
 
@@ -302,12 +303,13 @@ class HierarchyCache:
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if is_met(i, path))
         if passing:
             shown = tuple(i for i in shown if i.links.blocker not in passing)
+        sheets = sheets_of(shown, snapshot.meshes, materials)  # all together: what moves may leave another's side
         key = shown, (
             None if alike else tuple(rays_met(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            self._looks[1], maps.changes, glow.changes, tuple(origin),
+            self._looks[1], maps.changes, glow.changes, tuple(origin), sheets,
         )  # fmt: skip
-        look = snapshot.meshes, materials, path, maps, glow
+        look = snapshot.meshes, materials, path, maps, glow, sheets
         trees = self._kept.get(key)
         if trees is None and not settings.schedule.may_rebuild:
             trees = self._moved(key, look, origin, settings.schedule.is_draft, snapshot.instances)
@@ -326,7 +328,7 @@ class HierarchyCache:
 
     def _built(self, shown: tuple[Instance, ...], rest: tuple, look: tuple, origin: np.ndarray) -> Trees:
         """New trees, but for those of meshes that stand."""
-        meshes, materials, path, maps, glow = look
+        meshes, materials, path, maps, glow, sheets = look
         some = [one for one in shown if meshes[one.mesh].triangle_count]
         expanded, kinds = parted(
             some, meshes,
@@ -344,12 +346,12 @@ class HierarchyCache:
             first = some[own[0]]
             slots = {*first.materials, 0}  # faces without a material have the first one
             looks = tuple(self._looks[1][slot] for slot in sorted(slots) if slot < len(self._looks[1]))
-            named = (kind, meshes[first.mesh].version, looks, *rest[3:5])
+            named = (kind, meshes[first.mesh].version, looks, *rest[3:5], sheets)
             tree = used[named] = self._meshes.get(named) or _tree_of_mesh(first, look)
             if tree.triangles:
                 own = [some[k] for k in own]
                 copies.append(Copies(tree, own, [number[id(one)] for one in own], *tree.boxes.around(MOST_BOXES)))
-        world = Tree(*world_triangles(expanded, meshes, materials, origin, path, maps, glow))
+        world = Tree(*world_triangles(expanded, meshes, materials, origin, path, maps, glow, sheets))
         trees = Trees(world, maps.texels, copies, origin)
         trees.hierarchy = replace(trees.hierarchy, instances=shown, expanded=tuple(expanded))
         self._meshes = dict([*self._meshes.items()][-MOST_MESHES:]) | used
@@ -358,7 +360,7 @@ class HierarchyCache:
     def _moved(self, key: tuple, look: tuple, origin: np.ndarray, draft: bool, instances) -> Trees | None:
         """The trees of the same instances, of which a few have moved since; None if there are none."""
         shown, rest = key
-        meshes, materials, path, maps, glow = look
+        meshes, materials, path, maps, glow, sheets = look
         for other, trees in self._kept.items():
             old = other[0]
             if other[1] != rest or len(old) != len(shown) or trees.asked is instances:
@@ -382,7 +384,7 @@ class HierarchyCache:
                 continue
             starts = np.cumsum(counts) - counts
             triangles = [np.arange(starts[k], starts[k] + counts[k]) for k in numbers]
-            corners = world_triangles([shown[k] for k in expanded], meshes, materials, origin, path, maps, glow)
+            corners = world_triangles([shown[k] for k in expanded], meshes, materials, origin, path, maps, glow, sheets)
             del self._kept[other]
             if not trees.move(np.concatenate([*triangles, np.zeros(0, np.int64)]), corners, copies):
                 return None
@@ -404,9 +406,9 @@ def _looks(instance: Instance) -> tuple:
 
 def _tree_of_mesh(instance: Instance, look: tuple) -> Tree:
     """The tree of a mesh in its own space, as an instance shows it."""
-    meshes, materials, path, maps, glow = look
+    meshes, materials, path, maps, glow, sheets = look
     resting = replace(instance, matrix=np.eye(4))
-    tree = Tree(*world_triangles([resting], meshes, materials, np.zeros(3), path, maps, glow))
+    tree = Tree(*world_triangles([resting], meshes, materials, np.zeros(3), path, maps, glow, sheets))
     tree.low = tree.high = None  # it will not move
     return tree
 

@@ -9,6 +9,7 @@ Cost: numpy over all triangles of all instances, some 0.3 us each.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import groupby
 
 import numpy as np
@@ -26,6 +27,7 @@ ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
 ALONE = 0.99  # share of a material, from which on it is glass and nothing else
 ONE_SIDED = 0.25  # length of the sum of a sheet's faces, over their area
 SHEET = WHOLE_SHADOW  # of glass, which stops none for certain: all rays, by the side that they meet
+MOST_KEPT = 64  # meshes of which is kept what is open
 MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
 FRONT_ALONE = 0.25  # added to the material's number
 TINT_CODE = 1000.0  # taken from minus the colour of what passes, in the place of what is emitted
@@ -44,10 +46,12 @@ def world_triangles(
     path: str,
     maps: OpacityMaps,
     glow: EmissionMaps,
+    sheets: frozenset[int] = frozenset(),
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) float32 opacity (_codes), mean emitted radiance, number of the
-    material (with the side that emits, mean_emission) and packed corner normals."""
+    material (with the side that emits, mean_emission) and packed corner normals. `sheets`: what `sheets_of` says of all
+    instances together."""
     look = {
         (rays, mirrored): np.array([
             (mean_code(m, rays), *radiance, k + side)
@@ -60,7 +64,6 @@ def world_triangles(
     shown = [one for one in instances if is_met(one, path) and meshes[one.mesh].triangle_count]
     total = sum(meshes[one.mesh].triangle_count for one in shown)
     corners, looks, made = np.empty((total, 3, 3), np.float32), np.empty((total, 8), np.float32), 0
-    sheets = _sheets(shown, meshes, materials)
     # Of instances with equal kinds all triangles look the same.
     matrices_of_all = np.array([one.matrix[:3] for one in shown], float).reshape(-1, 3, 4)
     turns = np.linalg.det(matrices_of_all[:, :, :3])
@@ -151,7 +154,8 @@ def _codes(stopped: int, sides: np.ndarray, mirrored: bool, glass: bool, tile=0)
     """What decides whether rays pass triangles, as shaders/trace/hierarchy.glsl reads it: coverage (..., 2) of front
     and back by which they pass at random, or, where it is not 0, the `tile` (...) that tells it for each place, and
     which rays that is about; negative where rays may also be bent: then the first side is for rays from lamps and the
-    second one for others. `mirrored`: corners run the other way round."""
+    second one for others; but of a sheet (SHEET, which is WHOLE_SHADOW where nothing is bent) they are its sides.
+    `mirrored`: corners run the other way round."""
     sides = sides[..., ::-1] if mirrored and not glass else sides
     steps = np.rint(np.clip(sides, 0.0, 1.0) * SIDE_STEPS)
     even = (stopped * (SIDE_STEPS + 1) + steps[..., 0]) * (SIDE_STEPS + 1) + steps[..., 1]
@@ -180,35 +184,48 @@ def _refine(
             look[own, 0] = _codes(stopped, sides, mirrored, glass, known.tile[own])
 
 
-def _sheets(shown: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]) -> set[int]:
+def sheets_of(shown: Iterable[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]) -> frozenset[int]:
     """Materials of glass of which one side is the inside of no solid, as that of a pool's surface. Two sheets that face
     away from each other are a pane, whose light enters by one and leaves by the other: all open glass together must
     face one way more than others."""
     glass = {k for k, one in enumerate(materials) if one.glass is not None and one.glass.share > ALONE}
     facing, area, found = np.zeros(3), 0.0, set()
     for one in shown if glass else ():
-        if glass.isdisjoint(one.materials):
+        if glass.isdisjoint(one.materials) or not meshes[one.mesh].triangle_count:
             continue
         mesh = meshes[one.mesh]
         of_triangle = mesh.triangle_materials(one.materials)
-        own = ~closed_triangles(mesh) & np.isin(of_triangle, [*glass])
+        own = _open_triangles(mesh) & np.isin(of_triangle, [*glass])
         if own.any():
             corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[own]]] @ one.matrix[:3, :3].T
             across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             facing += across.sum(axis=0)
             area += np.linalg.norm(across, axis=1).sum()
             found.update(of_triangle[own].tolist())
-    return found if np.linalg.norm(facing) > ONE_SIDED * area else set()
+    return frozenset(found if np.linalg.norm(facing) > ONE_SIDED * area else ())
+
+
+_open: dict[tuple, np.ndarray] = {}  # by what tells a mesh's content
+
+
+def _open_triangles(mesh: Mesh) -> np.ndarray:
+    """(T,) which triangles belong to no closed part of the mesh."""
+    key = (mesh.key, mesh.version, mesh.triangle_count, mesh.bounds_min.tobytes(), mesh.bounds_max.tobytes())
+    if key not in _open:
+        if len(_open) >= MOST_KEPT:
+            _open.clear()
+        _open[key] = ~closed_triangles(mesh)
+    return _open[key]
 
 
 def _let_leave(
-    look: np.ndarray, of_triangle: np.ndarray, materials: list[CompiledMaterial], sheets: set[int], mesh: Mesh,
+    look: np.ndarray, of_triangle: np.ndarray, materials: list[CompiledMaterial], sheets: frozenset[int], mesh: Mesh,
     mirrored: bool,
 ) -> None:  # fmt: skip
     """Of open glass of `sheets` let pass from within what is left of even light there: it has spread over n2 as many
     directions, and total reflection keeps the rest."""
     size = SIDE_STEPS + 1
-    is_open = ~closed_triangles(mesh) & (np.abs(look[:, 0]) < MAPPED * size**2)
+    is_open = _open_triangles(mesh) & (np.abs(look[:, 0]) < MAPPED * size**2)
     for number in sheets:
         own = np.flatnonzero(is_open & (of_triangle == number))
         passing = 1.0 - np.abs(look[own, 0]) % size / SIDE_STEPS  # of even light, the second side

@@ -29,7 +29,7 @@ from .draw import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
 MOST_CELLS = 32  # that are averaged one by one
-BANDS = 9  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
+BANDS = 9  # of rows in the result, as in shaders/indirect/bands.glsl
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
 VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
 REFLECTANCE = passes.fullscreen_program(
@@ -44,6 +44,7 @@ REFLECTANCE = passes.fullscreen_program(
 MIRRORS_OWNED = (("MIRRORS_OWNED", "1"),)
 TURNED = (("TURNED_NORMALS", "1"),)  # where a material turns normals
 MIRRORS = (("SMOOTH_MIRRORS", "1"),)  # where a material is smooth metal
+MIRRORS_DROPPED = (("MIRRORS_DROPPED", "1"),)  # where Blender's Reflective Caustics are off
 TURNING = ("ShaderNodeNormalMap", "ShaderNodeBump")
 
 
@@ -59,7 +60,9 @@ class Reflectance:
         self._update(frame)
         owned = MIRRORS_OWNED if frame.plan.owns(LIGHT_SPECULAR_DIFFUSE) else ()
         mirrors = MIRRORS if any(smooth_metal(frame, k) for k in frame.snapshot.used_materials) else ()
-        self.image.defines = (*owned, *mirrors, *(TURNED if _turns_normals(frame) else ()))
+        dropped = () if frame.snapshot.film.caustics_reflective else MIRRORS_DROPPED
+        turned = TURNED if _turns_normals(frame) else ()
+        self.image.defines = (*owned, *mirrors, *dropped, *turned)
 
     def _update(self, frame: Frame) -> None:
         keys = keys_of(frame)
@@ -89,7 +92,8 @@ class Reflectance:
         for viewport in cells if few else [None]:
             self._average(frame, seen, viewport, rows, mirrors=0)
         for k in filter(lambda k: _throws_caustics(frame, k), changed):
-            self._average(frame, seen, (k % COLUMNS, k // COLUMNS, 1, 1), rows, mirrors=1)
+            for band in (0, 1):  # those whose fourth number is about mirrors
+                self._average(frame, seen, (k % COLUMNS, band * rows + k // COLUMNS, 1, 1), rows, mirrors=1)
         for image in seen:
             images.pool.give(image)
 

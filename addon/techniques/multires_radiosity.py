@@ -200,7 +200,7 @@ class MultiresRadiosity(InstantRadiosity):
         if shown_alone(frame):
             bindings["constants"]["near_radius"] *= FARTHER
         if not frame.settings.get(self, "near_bounces"):
-            bindings["constants"]["deeper"] = 0.0
+            bindings["constants"]["deeper"] = -1.0  # but over mirrors
         yield
         bound = self.visibility(frame, lights)
         yield

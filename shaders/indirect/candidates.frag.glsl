@@ -71,7 +71,7 @@ void main()
       direction = onward;
       origin = ray_origin(lit_position(met), met.lit);
     }
-    if (!trace_vertex(origin, direction, 1e29, roll.z, met, t)) {
+    if (!trace_vertex(origin, direction, 1e29, 0.0, roll.z, met, t)) {
       break;
     }
     if (bounce > 1) {
@@ -100,7 +100,8 @@ void main()
 #endif
     }
 #ifdef SMOOTH_MIRRORS
-    mirrored = bounce > 1 && mirror_drawn(met, -direction, to_unit(hash3(roll).y));
+    // The roll after this one is the onward direction's.
+    mirrored = bounce > 1 && mirror_drawn(met, -direction, to_unit(hash3(roll ^ uvec3(0x9E3779B9u)).x), true);
 #endif
     vec3 sent = direct_reflected(met, -direction, (bounce == 1) ? 4 : 1, roll.x);
     if (bounce == 1) {
@@ -108,6 +109,7 @@ void main()
       if (met.mirror_alpha >= 0.0) {
         // Rays of the picture's surfaces find what metal mirrors of other surfaces (indirect/near.glsl).
         met.reflection.straight = met.reflection.grazing = vec3(0.0);
+        throughput *= (max_component(met.reflection.diffuse) > 0.0) ? 1.0 : 0.0;
       }
 #endif
       radiance = sent;

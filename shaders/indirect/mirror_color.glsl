@@ -1,6 +1,5 @@
 // What smooth mirrors reflect, by the means of their materials (`reflectance`, see indirect/reflectance.frag.glsl).
-
-#define REFLECTANCE_BANDS 9  // see indirect/reflectance.frag.glsl
+#include "indirect/bands.glsl"
 
 // What of the lobe that stands there is the mirror's own. That one is at least LEAST_ALPHA wide, and scaled up for the light
 // that so rough a lobe scatters more than once: of white metal by a sixth. The mean albedo has the lobe's own width.

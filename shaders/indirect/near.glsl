@@ -2,10 +2,17 @@
 //
 // Virtual lights are bounded where they are near: one at distance d counts min(1, d2 / r2) of its light, a ray that meets a
 // surface at distance d counts 1 - min(1, d2 / r2) of what that sends. What smooth metal mirrors of other surfaces virtual
-// lights do not send (indirect/candidates.frag.glsl): rays meet that at any distance, and go on over the mirror. A program that includes this has the constants
-// `virtual_count`, `near_radius`, `glossy_radius` and `deeper` besides those of indirect/path.glsl.
+// lights do not send (indirect/candidates.frag.glsl): rays meet that at any distance, and go on over the mirror. A program
+// that includes this has the constants `virtual_count`, `near_radius`, `glossy_radius` and `deeper` besides those of
+// indirect/path.glsl.
 #include "indirect/path.glsl"
 #include "indirect/lights.glsl"
+
+#ifdef MIRRORS_DROPPED
+#define MIRROR_LIMIT 0.0
+#else
+#define MIRROR_LIMIT 1e29  // how far away rays look for mirrors
+#endif
 
 // Where a ray is on its way.
 struct Walk {
@@ -20,7 +27,8 @@ struct Walk {
 // Radiance that arrives along a walk's ray: light of sources that a surface reflects, virtual lights, and what surfaces
 // nearer to that one than `reach` send to it, each with the share that virtual lights leave to it, and what reaches those in
 // the same way: that last light, of which there is little and which takes most of the time where small things stand close,
-// only some samples look for (`deeper`: the weight that it has in them, 0 in the others).
+// only some samples look for (`deeper`: the weight that it has in them, 0 in the others; below 0 where it is left out but
+// for what comes over mirrors, which virtual lights do not send).
 vec3 radiance_along(Walk walk, float reach, uvec3 roll)
 {
   // Where a sample has no virtual lights, rays go as far as one light would leave to them.
@@ -35,19 +43,18 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     bool mirrored = false;
     if (!walk.has_met) {
       float t;
-#ifdef SMOOTH_MIRRORS
-      bool unbounded = true;
-#else
-      bool unbounded = walk.whole;
-#endif
-      if (!trace_vertex(walk.origin, walk.direction, unbounded ? 1e29 : reach, roll.z, walk.met, t)) {
+      float limit = walk.whole ? 1e29 : reach;
+      if (!trace_vertex(walk.origin, walk.direction, limit, MIRROR_LIMIT, roll.z, walk.met, t)) {
         break;
       }
       share = walk.whole ? 1.0 : max(1.0 - t * t / (reach * reach), 0.0);
       throughput *= walk.met.passed;
       throughput *= passing_media(walk.origin, walk.direction, t, roll.y);
 #ifdef SMOOTH_MIRRORS
-      mirrored = mirror_drawn(walk.met, -walk.direction, to_unit(hash3(roll).y));
+      mirrored = mirror_drawn(walk.met, -walk.direction, to_unit(hash3(roll).y), !walk.whole);
+      if (farther && deeper < 0.0 && !mirrored) {
+        break;
+      }
 #endif
       if (max_component(throughput) * (mirrored ? 1.0 : share) <= 1e-4) {
         break;
@@ -77,13 +84,19 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     if (walk.bounce < bounces) {
       vec3 from;
       vec3 arriving = virtual_irradiance(lit_position(walk.met), walk.met.lit, reach, walk.bounce > 0, roll.z, from);
-      sum += throughput * even_share(walk.met) * arriving * reflection_of(walk.met.reflection, walk.met.lit, from, -walk.direction);
+      vec3 sent = reflection_of(walk.met.reflection, walk.met.lit, from, -walk.direction);
+      sum += throughput * even_share(walk.met) * arriving * sent;
     }
     if (walk.bounce > 0 && !farther) {
-      if (deeper <= 0.0) {
+#if defined(SMOOTH_MIRRORS) && !defined(MIRRORS_DROPPED)
+      bool ends = deeper == 0.0;
+#else
+      bool ends = deeper <= 0.0;
+#endif
+      if (ends) {
         break;
       }
-      throughput *= deeper;
+      throughput *= abs(deeper);
       farther = true;
     }
     from_seen = walk.bounce == 0;

@@ -141,6 +141,23 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal, out vec3 turned,
 }
 
 #ifdef SMOOTH_MIRRORS
+// Whether what a ray meets may mirror it: smooth metal, or a sheet of glass from within.
+bool may_be_mirror(ivec2 hit, vec3 position, vec3 direction)
+{
+  int material = triangle_material(hit);
+  ivec2 place = ivec2(material & 15, material >> 4);
+  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  bool metal = reflectance_fetch(place).a > 0.5;
+  for (bool unsure = metal; unsure; unsure = false) {
+    metal = max_component(reflectance_fetch(place + ivec2(0, 3 * rows)).rgb) > 0.0;
+  }
+#ifdef GLASS_SHEETS
+  return metal || leaves_sheet(hit, position, direction);
+#else
+  return metal;
+#endif
+}
+
 // Whether a ray that meets this has met smooth metal, and how it mirrors.
 void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
 {
@@ -150,15 +167,18 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
   met.mirror_alpha = -1.0;
   met.mirror_normal = met.normal;
   met.mirror_share = vec3(0.0);
+#ifdef GLASS_SHEETS
   // From below a sheet of water rays pass with the chance that light from there leaves it: all others it mirrors.
-  for (bool within = code > 0.5 && leaves_sheet(hit, met.position, direction); within; within = is_mirror = false) {
+  for (bool within = leaves_sheet(hit, met.position, direction); within; within = is_mirror = false) {
     met.reflection.diffuse = vec3(0.0);
     met.reflection.straight = met.reflection.grazing = met.mirror_share = vec3(1.0);
     met.mirror_alpha = 0.0;
   }
+#endif
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
   for (; is_mirror; is_mirror = false) {
-    met.mirror_alpha = max(code - 1.0, 0.0);
+    ivec2 place = ivec2(material & 15, (material >> 4) + reflectance_size().y / REFLECTANCE_BANDS);
+    met.mirror_alpha = reflectance_fetch(place).a / code;
     met.mirror_share = mirror_scale(material);
     vec3 smooth_normal = triangle_shading_normal(hit, met.position);
     smooth_normal = (dot(smooth_normal, met.normal) < 0.0) ? -smooth_normal : smooth_normal;
@@ -190,14 +210,18 @@ vec3 mirror_sample(Vertex met, vec3 viewer, vec2 u, out vec3 weight)
 }
 
 // Whether a path goes on by the mirror of what it has met, drawn by how much of what that reflects the mirror has. What
-// remains of its reflection is the way drawn, over the chance of that.
-bool mirror_drawn(inout Vertex met, vec3 viewer, float u)
+// remains of its reflection is the way drawn, over the chance of that. Where MIRRORS_DROPPED is defined, light does not go
+// by mirrors to rough surfaces (`to_rough`).
+bool mirror_drawn(inout Vertex met, vec3 viewer, float u, bool to_rough)
 {
   if (met.mirror_alpha < 0.0) {
     return false;
   }
   float mirrored = luminance(mirror_reflectance(met, dot(met.mirror_normal, viewer)));
   float chance = mirrored / max(mirrored + luminance(met.reflection.diffuse), 1e-30);
+#ifdef MIRRORS_DROPPED
+  chance = to_rough ? 0.0 : chance;
+#endif
   bool drawn = u < chance;
   float scale = 1.0 / max(drawn ? chance : 1.0 - chance, 1e-6);
   met.reflection.diffuse *= drawn ? 0.0 : scale;
@@ -207,16 +231,27 @@ bool mirror_drawn(inout Vertex met, vec3 viewer, float u)
 }
 #endif
 
-// The surface that a ray meets before `limit`; false if none.
-bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Vertex met, out float t)
+// The surface that a ray meets before `limit`, or the mirror that it meets before `mirror_limit`, if that is farther;
+// false if none.
+bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, uint salt, out Vertex met, out float t)
 {
   ivec2 hit;
-  t = trace_nearest(origin, direction, limit, salt, hit);
+#ifdef SMOOTH_MIRRORS
+  float most = max(limit, mirror_limit);
+#else
+  float most = limit;
+#endif
+  t = trace_nearest(origin, direction, most, salt, hit);
   met.passed = layers_color(t);
-  if (t >= limit) {
+  if (t >= most) {
     return false;
   }
   met.position = origin + t * direction;
+#ifdef SMOOTH_MIRRORS
+  if (t >= limit && !may_be_mirror(hit, met.position, direction)) {
+    return false;
+  }
+#endif
   met.normal = triangle_normal(hit);
   if (dot(met.normal, direction) > 0.0) {
     met.normal = -met.normal;

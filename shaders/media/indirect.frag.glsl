@@ -10,6 +10,7 @@
 // media drawn by what they let pass, or to a surface, where the row is asked. STRAIGHT_ALONE: `out_found` is what comes
 // straight from media that shine, and no lights are asked. AT_HITS: view rays are those that mirrors and glass send on.
 #include "lib/gbuffer.glsl"
+#include "indirect/bands.glsl"
 #include "media/arriving.glsl"
 #include "media/from_lamps.glsl"
 #ifdef AT_HITS
@@ -30,8 +31,6 @@
 #else
 #define SCATTERS_ON true
 #endif
-
-#define REFLECTANCE_BANDS 9  // see indirect/reflectance.frag.glsl
 
 // `through`: what of it leaves on the other side.
 vec3 mean_albedo(ivec2 hit, out vec3 through)

@@ -10,7 +10,7 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
   for (int bounce = 0; bounce < bounces; bounce++) {
     Vertex met;
     float t;
-    if (!trace_vertex(origin, direction, 1e29, roll.z, met, t)) {
+    if (!trace_vertex(origin, direction, 1e29, 0.0, roll.z, met, t)) {
       break;
     }
     throughput *= passing_media(origin, direction, t, roll.y);

@@ -13,7 +13,9 @@ from addon.scene import acceleration, instance_tree
 from addon.scene.acceleration import HierarchyCache
 from addon.scene.emission_maps import EmissionMaps
 from addon.scene.opacity_maps import OpacityMaps
+from addon.snapshot.scene import Material
 from tests.frame.test_plan import room
+from tests.materials.graphs import graph, node
 
 
 @pytest.fixture
@@ -97,3 +99,38 @@ def test_copy_that_grows_from_a_point_is_met(gpu_context, monkeypatch, before):
     matrices[7, :3, :3] = np.eye(3)
     grown, fresh = (one.get(with_copies(), "glossy") for one in (cache, HierarchyCache()))
     assert np.array_equal(images.read(grown.nodes), images.read(fresh.nodes))
+
+
+@pytest.mark.parametrize("own_tree", [1, 1000])
+def test_whether_glass_is_a_sheet_all_of_it_says_together(gpu_context, monkeypatch, own_tree):
+    """Two open faces that look apart are a pane, also while one of them moves, or in a tree of their own; once one of
+    them is turned, both are sheets."""
+    monkeypatch.setattr(instance_tree, "OWN_TREE", own_tree)
+    glass = graph(
+        node("Glass", "ShaderNodeBsdfGlass", {"BSDF": "SHADER"}, Color=(1, 1, 1, 1), Roughness=0.0, IOR=1.5),
+        surface=("Glass", "BSDF"),
+    )
+    whole = room()
+    opaque, away = replace(whole.instances[0], materials=(1,)), np.diag([1, -1, -1, 1.0])
+    clear, mesh = Material("glass", "glass", glass), whole.meshes["mesh"]
+    flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    whole = replace(
+        whole, materials=(clear, *whole.materials),
+        meshes={"mesh": replace(mesh, positions=flat), "wall": replace(mesh, key="wall")},
+    )  # fmt: skip
+
+    def with_second(matrix, height):
+        matrix = matrix.copy()
+        matrix[2, 3] = height
+        two = whole.instances[0], replace(whole.instances[0], matrix=matrix)
+        rest = tuple(replace(opaque, mesh="wall") for _ in range(8))
+        return seen_by(replace(whole, instances=(*two, *rest)))
+
+    def is_sheet(cache, matrix, height):
+        return ("GLASS_SHEETS", "1") in cache.get(with_second(matrix, height), "glossy").leaves.defines
+
+    cache = HierarchyCache()
+    assert not is_sheet(cache, away, -0.1)
+    assert not is_sheet(cache, away, -0.2)  # a draft moves what has moved alone
+    assert is_sheet(cache, np.eye(4), -0.2)
+    assert not is_sheet(cache, away, -0.2)

@@ -334,6 +334,26 @@ def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_
     means.release()
 
 
+def test_mean_of_a_mirror_among_other_lobes_keeps_the_width_of_the_mirror(stage, gpu_context):
+    """Seven tenths of the pixels keep the smooth one of two lobes of metal, of alpha .2^2."""
+    material = stage.material("ShaderNodeMixShader", Fac=0.3)
+    tree = material.node_tree
+    for place, roughness in ((1, 0.2), (2, 0.9)):
+        lobe = tree.nodes.new("ShaderNodeBsdfAnisotropic")
+        lobe.inputs["Roughness"].default_value = roughness
+        tree.links.new(lobe.outputs[0], tree.nodes["Mix Shader"].inputs[place])
+    stage.floor(material=material)
+    stage.camera_above(4.0)
+    stage.render(1)
+    means = Reflectance()
+    means.update(stage.renderer.frame)
+    found = images.read(means.image)
+    share, alpha = found[0, 1, 3], found[1, 1, 3]
+    assert 0.55 < share < 0.85
+    assert alpha / share == pytest.approx(0.04, rel=0.01)
+    means.release()
+
+
 @pytest.mark.parametrize(("samples", "whole"), [(1, True), (3, True), (64, False), (4, True), (30, True), (64, True)])
 def test_light_between_close_surfaces_counts_once_in_the_mean(samples, whole):
     frame = SimpleNamespace(settings=Settings(samples, schedule=FINAL if whole else AT_REST), sample=0)

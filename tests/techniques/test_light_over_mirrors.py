@@ -8,6 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.compare.reference import render_passes
+
 SIZE, BOUNCES = (48, 36), 8
 
 
@@ -95,6 +97,19 @@ def test_an_upright_mirror_sends_no_light_of_a_floor_back_to_it(stage):
     upright(stage, 1.0, polish(stage, roughness=0.0))
     aimed(stage, (0, 0, 2.0), (0, 0, 0), 0.7)
     assert diffuse_indirect(stage, "CANDELA", 4).max() < 1e-5
+
+
+def test_without_reflective_caustics_metal_sends_no_light_to_rough_surfaces(stage):
+    """What the upright mirror sends to the wall that faces it, as Cycles leaves it out."""
+    wall(stage)
+    off = [(stage.scene.cycles, "caustics_reflective", False)]
+    ours, theirs = (
+        render_passes(stage.scene, engine, samples, 1, size=(32, 24), bounces=BOUNCES, extra=off).images[
+            "diffuse_indirect"
+        ]
+        for engine, samples in (("CANDELA", 32), ("CYCLES", 128))
+    )
+    assert ours[..., :3].mean() == pytest.approx(theirs[..., :3].mean(), rel=0.03)
 
 
 @pytest.mark.slow

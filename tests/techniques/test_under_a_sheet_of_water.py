@@ -6,10 +6,10 @@ from addon.compare.passes import light_paths
 from addon.materials.energy import pane_passing
 
 
-def pool(stage, index=1.33, albedo=0.5, turn=(0, 0, 0)):
+def pool(stage, index=1.33, albedo=0.5, turn=(0, 0, 0), roughness=0.0):
     """A wide ground below a sheet, under an even world of radiance 1, seen from above."""
     stage.rectangle((-20, -20), (20, 20), z=-0.3, material=stage.diffuse(albedo))
-    glass = stage.material("ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0, IOR=index)
+    glass = stage.material("ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=roughness, IOR=index)
     stage.rectangle((-20, -20), (20, 20), material=glass, turn=turn)
     stage.world()
     stage.camera_above(1.0, 2.0)
@@ -29,3 +29,15 @@ def test_a_ground_below_water_has_the_light_that_faces_leave_and_mirror_back(sta
     radiance = 0.5 * passing / (1 - (1 - passing) * 0.5)
     straight = 1 - ((index - 1) / (index + 1)) ** 2
     assert seen(stage, 16) == pytest.approx(straight * radiance, rel=0.03)
+
+
+def test_frosted_water_mirrors_back_as_much_as_clear_water(stage):
+    """Of light on the ground alone: what it has of a sheet of any roughness is that of the faces' mean."""
+    stage.scene.view_layers[0].use_pass_diffuse_indirect = True
+    found = []
+    for roughness in (0.0, 0.4):
+        stage.clear()
+        pool(stage, roughness=roughness)
+        stage.scene.camera.location.z = -0.05  # below the sheet
+        found.append(light_paths(stage.render(16, (16, 16), bounces=24))["diffuse_indirect"].mean())
+    assert found[1] == pytest.approx(found[0], rel=0.05)
