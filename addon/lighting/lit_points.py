@@ -28,7 +28,7 @@ from ..materials import gloss
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
-from .point_light import LIGHTING, PointLight
+from .point_light import LIGHTING, LIGHTING_WITH_WAYS, PointLight
 
 NAMES = ("position", "normal", "diffuse")  # of the images of shaded points, as surface images are laid out
 REFLECT = passes.fullscreen_program(
@@ -46,6 +46,7 @@ REFLECT_APART = replace(
     outputs=tuple(("VEC4", f"out_{name}") for name in (*NAMES, "albedo", "gloss")),
 )
 PROGRAMS = (REFLECT, LIGHTING)
+DIRECTED_PROGRAMS = (REFLECT_APART, LIGHTING_WITH_WAYS)  # where gloss is apart
 
 
 class LitPoints:

@@ -105,6 +105,7 @@ LOBES = passes.fullscreen_program(
 )
 LOBE_TEXTURES = (("RGBA32F", "node_flux"), ("RGBA32F", "node_ways"))  # of programs that look at gloss by direction
 PROGRAMS = (CLIPS, OF_GROUPS, ARRIVING, SENT, SHARES, PULL_POINTS, PULL)
+DIRECTED_PROGRAMS = (*PROGRAMS, LOBES)  # where the run has gloss apart
 
 
 def parts(leaves: int, side: int) -> list[tuple[int, int]]:

@@ -316,6 +316,34 @@ def may_reflect(graph: Graph) -> bool:
     )
 
 
+# Whose lobes are none of microfacets.
+DULL = (
+    "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTranslucent", "ShaderNodeBsdfTransparent", "ShaderNodeBsdfSheen",
+    "ShaderNodeBsdfToon", "ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled", "ShaderNodeBsdfRayPortal",
+)  # fmt: skip
+
+
+def may_mirror(graph: Graph) -> bool:
+    """Whether some node of the graph can have a lobe of microfacets: cheap, by the nodes' types alone."""
+    return any(
+        ("Bsdf" in node.type and node.type not in DULL) or node.type == "ShaderNodeEeveeSpecular"
+        for node in graph.nodes.values()
+    )
+
+
+def may_tint(graph: Graph) -> bool:
+    """Whether some node of the graph can colour what passes straight through: cheap, by its sockets alone."""
+    return any(
+        ((node.type == "ShaderNodeBsdfTransparent" or node.type in REFRACTING) and _not_grey(node.inputs.get("Color")))
+        or (
+            node.type == "ShaderNodeBsdfPrincipled"
+            and _not_black(node.inputs.get("Transmission Weight"))
+            and _not_grey(node.inputs.get("Base Color"))
+        )
+        for node in graph.nodes.values()
+    )
+
+
 REFLECTING = ("ShaderNodeSubsurfaceScattering", "ShaderNodeEeveeSpecular")  # beside those named Bsdf
 REFRACTING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
@@ -369,6 +397,12 @@ def may_walk(graph: Graph) -> bool:
         for node in graph.nodes.values()
         if node.type in methods
     )
+
+
+def _not_grey(socket) -> bool:
+    if socket is None or socket.link is not None:
+        return socket is not None
+    return isinstance(socket.value, tuple) and len(set(socket.value[:3])) > 1
 
 
 def _not_black(socket) -> bool:

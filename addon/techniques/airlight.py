@@ -46,7 +46,7 @@ from ..gfx.library import Program
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.media import RAY_TEXTURES, LightOfMedia, MediaEmission, MediaService, Rays, is_endless
 from ..lighting.media_bounces import CONSTANTS, LIT_TEXTURES, WORLD_TEXTURES, Lit, MediaBounces, defines_of
-from ..materials.compiler import may_emit
+from ..materials.compiler import may_emit, may_tint
 from ..materials.graph import Graph
 from ..scene import acceleration
 from ..scene.media import ATTENUATION_TEXTURES, MEDIA_TEXTURES, has_media
@@ -54,6 +54,7 @@ from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.environment import WORLD
+from ..surfaces import seen_layers
 from ..surfaces.draw import SURFACES
 from ..surfaces.seen_layers import SeenLayers
 
@@ -175,6 +176,10 @@ class Airlight(Technique):
         if not any(may_send(graph) for graph in volume_graphs(snapshot)):
             return "the scene's volumes absorb alone: nothing in them scatters or shines"
         return acceleration.too_many(snapshot)
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        tints = any(may_tint(one.graph) for one in snapshot.materials)
+        return (seen_layers.AWAY,) if tints else ()
 
     def sample(self, frame: Frame) -> Iterator[None]:
         media = frame.service(MediaService)

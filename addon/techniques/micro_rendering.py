@@ -40,10 +40,10 @@ from itertools import product
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
-from ..gfx import images, passes
+from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..kernels import lists
-from ..lighting import micro_buffers
+from ..lighting import lit_points, micro_buffers
 from ..lighting.asked import asked
 from ..lighting.micro_buffers import (
     BUFFER_CONSTANTS,
@@ -55,6 +55,7 @@ from ..lighting.micro_buffers import (
     buffer_bindings,
 )
 from ..lighting.point_runs import PointRuns, Run
+from ..materials.compiler import may_mirror
 from ..scene import acceleration
 from ..scene.seen import SEES
 from ..scene.view import VIEW
@@ -171,7 +172,11 @@ class MicroRendering(MultiresRadiosity):
         return super().skip(snapshot, settings) or acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return (SEES, *micro_buffers.PROGRAMS, REFLECTED)
+        regions = REGIONS if context.counts_in_images() else REGIONS_OF_LEVEL
+        if not any(may_mirror(one.graph) for one in snapshot.materials):
+            return SEES, *lit_points.PROGRAMS, *micro_buffers.PROGRAMS, regions, REFLECTED
+        seen = by_direction(regions), by_direction(GLOSSY)
+        return SEES, *lit_points.DIRECTED_PROGRAMS, *micro_buffers.DIRECTED_PROGRAMS, *seen, REFLECTED
 
     def begin(self, frame: Frame) -> None:
         if frame.receivers is not None and len(frame.receivers.distance):

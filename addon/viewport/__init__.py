@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 
 import bpy
 import gpu
@@ -129,28 +130,30 @@ def _painted(viewport: Viewport) -> bool:
     now = time.monotonic()
     if viewport.dirty or not viewport.settled:
         return False
-    shown = any(one.is_dirty and whole_key(one.session_uid) in viewport.cache.images for one in bpy.data.images)
     if now < viewport.images_again:
-        if shown:
-            _look_later(viewport, viewport.images_again - now)
+        _look_later(viewport, viewport.images_again - now)
         return False
     viewport.images_again = now + max(LOOK_AT_IMAGES_S, LOOK_SHARE * viewport.reading)
-    return shown
+    return _shows_unsaved(viewport)
+
+
+def _shows_unsaved(viewport: Viewport) -> bool:
+    return any(one.is_dirty and whole_key(one.session_uid) in viewport.cache.images for one in bpy.data.images)
 
 
 def _look_later(viewport: Viewport, seconds: float) -> None:
-    """Draw again after that time: what was painted since the last look would else stay unseen until something else
-    draws the region."""
+    """Ask once more after that time, and draw again: what was painted since the last look would else stay unseen until
+    something else draws the region."""
     if viewport.looks_later:
         return
     viewport.looks_later = True
 
     def look() -> None:
         viewport.looks_later = False
-        if (engine := viewport.owner()) is not None:
+        if (engine := viewport.owner()) is not None and _shows_unsaved(viewport):
             engine.tag_redraw()
 
-    bpy.app.timers.register(look, first_interval=seconds)
+    _call_later(viewport, look, seconds)
 
 
 def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int]) -> None:
@@ -306,7 +309,18 @@ def _redraw_soon(viewport: Viewport) -> None:
         engine.tag_redraw()
         return None
 
-    bpy.app.timers.register(look, first_interval=LOOK_AGAIN_S)
+    _call_later(viewport, look, LOOK_AGAIN_S)
+
+
+def _call_later(viewport: Viewport, timer: Callable[[], float | None], seconds: float) -> None:
+    viewport.timers = [one for one in viewport.timers if bpy.app.timers.is_registered(one)] + [timer]
+    bpy.app.timers.register(timer, first_interval=seconds)
+
+
+def _release(viewport: Viewport) -> None:
+    for timer in filter(bpy.app.timers.is_registered, viewport.timers):
+        bpy.app.timers.unregister(timer)
+    viewport.release()
 
 
 def _free_soon() -> None:
@@ -323,7 +337,7 @@ def _free_orphans() -> float | None:
         return FREE_AFTER_S  # later
     try:
         for key in orphans:
-            _viewports.pop(key).release()
+            _release(_viewports.pop(key))
         images.pool.trim()
     finally:
         turn.release()
@@ -333,7 +347,7 @@ def _free_orphans() -> float | None:
 def free_all() -> None:
     """Free every viewport; those that are still open begin anew with their next redraw."""
     for viewport in _viewports.values():
-        viewport.release()
+        _release(viewport)
     _viewports.clear()
     _ahead.close()
     if bpy.app.timers.is_registered(_free_orphans):

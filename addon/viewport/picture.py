@@ -58,7 +58,8 @@ class Viewport:
         self.dirty = True  # the scene may have changed since the snapshot
         self.reading = 0.0  # seconds that it took to be read last
         self.images_again = 0.0  # when unsaved images are looked at next
-        self.looks_later = False  # a timer draws then
+        self.looks_later = False  # a timer looks then
+        self.timers: list[Callable[[], float | None]] = []  # of Blender's main loop, which end with this viewport
         self.frame: Frame | None = None
         self.scale = SCALES[-2]
         self.step, self.coarsest = STEP_S, SCALES[-1]  # what a step of a moving view may take; the coarsest pixels

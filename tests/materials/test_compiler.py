@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from addon.materials.compiler import compile_material, default_graph
+from addon.materials.compiler import compile_material, default_graph, may_mirror, may_tint
 from addon.materials.graph import Graph, Input, Node
 from addon.snapshot.scene import Image
 from tests.materials.graphs import diffuse, emission, graph, image, math, mix, node, principled, transparent
@@ -167,6 +167,20 @@ def test_alpha_decides_transparency_by_value_and_by_pixels():
     assert with_alpha(0.25).transparent
     assert with_alpha(0.25).opacity == pytest.approx(0.25)
     assert with_alpha(1.0).program_key == with_alpha(0.25).program_key
+
+
+@pytest.mark.parametrize(("shader", "mirrors", "tints"), [
+    (diffuse(Color=(0.8, 0.5, 0.1, 1.0)), False, False),
+    (principled("Principled", Roughness=1.0), True, False),
+    (principled("Principled", Transmission_Weight=1.0, Base_Color=(0.8, 0.5, 0.1, 1.0)), True, True),
+    (principled("Principled", Transmission_Weight=0.0, Base_Color=(0.8, 0.5, 0.1, 1.0)), True, False),
+    (transparent(Color=(0.8, 0.8, 0.8, 1.0)), False, False),
+    (transparent(Color=(0.8, 0.5, 0.1, 1.0)), False, True),
+])  # fmt: skip
+def test_what_may_mirror_or_tint_is_told_from_a_graph_as_from_a_compiled_one(shader, mirrors, tints):
+    made = graph(shader, surface=(shader.key, "BSDF"))
+    found = compile_material("Material", made)
+    assert (may_mirror(made), may_tint(made)) == (found.glossy, found.tinted) == (mirrors, tints)
 
 
 def test_mean_emission_of_constants_and_images():

@@ -1,16 +1,22 @@
 """Media against closed forms: Beer-Lambert, airlight's integral, phase functions, furnace; and stress."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 
+from addon.frame.settings import Settings
 from addon.gfx import images, passes
 from addon.lighting.media import MediaService
+from addon.materials.graph import Graph
 from addon.materials.volume import PHASES, Medium
 from addon.scene.media import BOX, CORNERS, Filled, box_rows, phase_values
 from addon.snapshot.volumes import openvdb
-from addon.techniques.airlight import SPREAD
+from addon.surfaces import seen_layers
+from addon.techniques.airlight import SPREAD, Airlight
 from addon.ui.properties import settings_of
+from tests.materials.graphs import transparent
 from tests.techniques.foggy_stage import absorber, box, fill, fog, glowing_floor, volume
 from tests.techniques.test_image_space_subsurface import sphere
 
@@ -347,6 +353,14 @@ def test_airlight_is_the_same_at_any_size(stage, scale):
     lit_cube(stage, scale)
     seen = stage.render(64, size=(8, 8))["volume_direct"][5, 5, 0]
     assert seen == pytest.approx(airlight_of_cube(), rel=0.03)
+
+
+@pytest.mark.parametrize("tint", [(1.0, 1.0, 1.0), (1.0, 0.5, 0.1)])
+def test_the_program_of_layers_before_media_is_compiled_ahead_where_something_tints(tint):
+    pane = transparent(Color=(*tint, 1.0))
+    made = Graph({pane.key: pane}, (pane.key, "BSDF"))
+    seen = SimpleNamespace(materials=[SimpleNamespace(graph=made)])
+    assert (seen_layers.AWAY in Airlight().programs(seen, Settings())) == (len({*tint}) > 1)
 
 
 def mirrored_alone(stage):

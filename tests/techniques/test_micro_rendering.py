@@ -12,6 +12,7 @@ from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
 from addon.frame.run import Renderer
+from addon.gfx import library, passes
 from addon.lighting import point_runs
 from addon.snapshot import SnapshotCache, take
 from addon.techniques import make_registry, micro_rendering
@@ -166,6 +167,30 @@ def test_trees_stay_while_cameras_and_lamps_move_and_are_made_anew_for_what_is_m
     thing.location.z -= 0.1
     render(2)
     assert counters()["trees made"] == 2
+
+
+@pytest.mark.parametrize("glossy", [False, True])
+def test_what_gloss_by_direction_draws_is_among_the_programs_that_are_compiled_ahead(
+    stage, render, monkeypatch, glossy
+):
+    stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.5) if glossy else stage.diffuse(0.5))
+    stage.rectangle((-1, -1), (1, 1), 1.0, material=stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0.5), energy=10)
+    stage.camera_above()
+    foretold, drawn, own = [], set(), micro_rendering.MicroRendering.programs
+
+    def programs(self, snapshot, settings):
+        foretold.extend(own(self, snapshot, settings))
+        return ()  # so that only what is drawn is asked for
+
+    get = library.get
+    monkeypatch.setattr(micro_rendering.MicroRendering, "programs", programs)
+    for module in (library, passes):
+        monkeypatch.setattr(module, "get", lambda program: drawn.add(program) or get(program))
+    render(2, size=(8, 8), samples=1, points=256)
+    assert {*foretold} <= drawn
+    missing = {one.name for one in drawn - {*foretold}}
+    assert not [name for name in missing if "gloss" in name or "ways" in name], missing
 
 
 def test_trees_stay_where_an_object_has_another_pass_index(stage):

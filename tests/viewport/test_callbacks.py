@@ -278,3 +278,25 @@ def test_an_image_that_a_script_has_painted_is_read_with_the_next_redraw(window,
     made.redraws = 0
     look()
     assert made.redraws == 1
+
+
+def test_no_timer_of_a_viewport_outlives_it_nor_are_images_asked_in_each_redraw(window, monkeypatch):
+    made, asked = Engine(), []
+    window.scene.candela.bounces, window.scene.candela.viewport_samples = 0, 1
+    monkeypatch.setattr(viewport, "_shows_unsaved", lambda one: asked.append(one) or False)
+    window.update(made)
+    for _ in range(200):
+        window.draw(made)
+        (kept,) = viewport._viewports.values()
+        if kept.settled:
+            break
+    kept.images_again = 0.0
+    for _ in range(3):
+        window.draw(made)
+    assert len(asked) == 1 and kept.looks_later
+    kept.held = True
+    viewport._redraw_soon(kept)
+    timers = kept.timers
+    assert len(timers) == 2 and all(map(bpy.app.timers.is_registered, timers))
+    viewport.free_all()
+    assert not any(map(bpy.app.timers.is_registered, timers))
