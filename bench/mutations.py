@@ -240,7 +240,21 @@ def by_room(states: dict[str, str]) -> list[list[str]]:
     return rows
 
 
+def misplaced(options: argparse.Namespace) -> str | None:
+    """What options that would be ignored, or would change another list, lack."""
+    if not options.drawn:
+        for name in ("tests", "again", "equivalent"):
+            if getattr(options, name):
+                return f"--{name} is of wrongs that are drawn: give --drawn N, too."
+    if options.reason and not options.equivalent:
+        return "--reason says why nothing can notice a wrong: give --equivalent NAME, too."
+    return None
+
+
 def command(options: argparse.Namespace) -> int:
+    if (asked := misplaced(options)) is not None:
+        print(asked)
+        return 2
     results = JUDGED / f"mutations_{options.seed}.json" if options.drawn else RESULTS
     before = json.loads(results.read_text("utf-8")) if results.exists() else {}
     wanted = chosen(options, before if options.drawn else {})
@@ -252,6 +266,9 @@ def command(options: argparse.Namespace) -> int:
     if options.equivalent:
         if not options.reason or options.equivalent not in before:
             print("A reason and the whole name of one that was drawn are needed, as --list prints it.")
+            return 2
+        if before[options.equivalent]["state"] == KILLED:
+            print(f"A test notices it: {before[options.equivalent]['by']}")
             return 2
         before[options.equivalent] |= {"state": EQUIVALENT, "by": options.reason}
         write_whole(results, json.dumps(before, indent=1, ensure_ascii=False) + "\n")

@@ -46,13 +46,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", default="96x72", help="pixels of the draft")
     parser.add_argument("--seeds", type=int, default=3, help="figures are means over so many")
     parser.add_argument("--truth", type=int, default=64, help="samples of a converged picture")
-    parser.add_argument("--strip", type=Path, help="write a picture: converged, without history, with it, by step")
+    parser.add_argument(
+        "--strip",
+        type=Path,
+        help="write a picture for each row, named by scene and way: converged, without history, with it, by step",
+    )
     parser.add_argument("--page", action="store_true", help=f"write rows into docs/{PAGE.name}; others stay")
 
 
 def command(options: argparse.Namespace) -> int:
     import addon
 
+    if too_few(options):
+        print(f"--steps is at least {2 * AFTER - 1}, for the {AFTER} steps after the edit.")
+        return 2
     addon.register()
     rows = [HEAD]
     for scene in options.scenes:
@@ -68,6 +75,11 @@ def command(options: argparse.Namespace) -> int:
     return 0
 
 
+def too_few(options: argparse.Namespace) -> bool:
+    """Whether the steps after the edit are not all among those that are drawn."""
+    return "edit" in options.ways and options.steps // 2 + AFTER > options.steps
+
+
 def row_of(name: str, way: str, options: argparse.Namespace) -> tuple[str, ...]:
     """A row of the table."""
     import bpy
@@ -81,13 +93,20 @@ def row_of(name: str, way: str, options: argparse.Namespace) -> tuple[str, ...]:
     truths = [steps.truth(number, options.truth) for number in measured]
     drawn = [steps.drawn(seed, measured) for seed in range(options.seeds)]
     better, seen = (
-        np.array([[errors(picture, truth) for picture, truth in zip(getattr(one, name), truths)] for one in drawn])
+        np.array(
+            [
+                [errors(picture, truth) for picture, truth in zip(getattr(one, name), truths, strict=True)]
+                for one in drawn
+            ]
+        )
         for name in ("joined", "alone")
     )
     masks = np.array([one.fresh for one in drawn])
     slow, quick = np.mean([one.speed for one in drawn], axis=0)
     if options.strip:
-        write_strip(options.strip, truths, drawn[0].alone, drawn[0].joined)
+        several = len(options.scenes) * len(options.ways) > 1
+        row = f"{options.strip.stem}_{path.stem}_{way}" if several else options.strip.stem
+        write_strip(options.strip.with_stem(row), truths, drawn[0].alone, drawn[0].joined)
     before, after = float(seen.mean()), float(better.mean())
     new = [float(one[masks].mean()) if masks.any() else 0.0 for one in (seen, better)]
     return (

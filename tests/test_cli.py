@@ -333,7 +333,9 @@ def test_files_of_others_in_the_folder_of_an_output_stay(verb, names, tmp_path):
     ("head", "is_ours"),
     [
         ('<meta name="generator" content="Candela">\n<title>A: Candela against Cycles</title>', True),
-        ("<title>Two &amp; more: Candela against Cycles</title>", True),  # as versions before that mark wrote it
+        # As versions before that mark wrote it.
+        (f"<title>Two &amp; more: Candela against Cycles</title>\n<style>\n{MADE_BY[1][1]}", True),
+        ("<title>Notes: Candela against Cycles</title>", False),
         ("<title>Notes on Candela against Cycles</title>", False),
     ],
 )

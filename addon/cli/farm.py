@@ -32,9 +32,9 @@ FLAMENCO = Path(__file__).with_name("candela_flamenco.js")
 MOST_CHUNKS = 1024  # values that a parameter of tasks may have, by the specification
 # What each file of a bundle holds, and hardly one of another program.
 MARKS = {
-    "template.json": ('"name": "Candela: ',),
-    "parameter_values.json": ('"BlendFile"',),
-    "asset_references.json": ('"assetReferences"',),
+    "template.json": (('"name": "Candela: ',),),
+    "parameter_values.json": (('"BlendFile"',),),
+    "asset_references.json": (('"assetReferences"',),),
 }
 FILE, FOLDER = "{{Param.BlendFile}}", "{{Param.OutputFolder}}"
 
@@ -44,7 +44,7 @@ def write_job(job: Job) -> None:
     options, scene = job.options, job.scene
     folder = output(options.output, folder=True)
     name = options.file.stem
-    refuse_others(folder, MARKS | {f"candela_{name}.js": ("Candela",)})
+    refuse_others(folder, MARKS | {f"candela_{name}.js": (("Candela",),)})
     results = (options.results or folder / "pictures").resolve()
     frames = options.frames
     if frames is None and options.frame is not None:

@@ -55,14 +55,15 @@ def output(path: Path, folder: bool) -> Path:
     return path
 
 
-def refuse_others(folder: Path, marks: dict[str, tuple[str, ...]], beside: tuple[str, ...] = ()) -> None:
+def refuse_others(folder: Path, marks: dict[str, tuple[tuple[str, ...], ...]], beside: tuple[str, ...] = ()) -> None:
     """Raise Refused where a file of one of these names stands in the folder and holds none of the marks that those have
-    which Candela writes; of the names `beside`, which bear no mark, where none of the marked ones stands."""
+    which Candela writes (a mark is there where all of its strings are); of the names `beside`, which bear no mark,
+    where none of the marked ones stands."""
     for name, known in marks.items():
         with contextlib.suppress(FileNotFoundError):
             with (folder / name).open(encoding="utf-8", errors="replace") as file:
                 text = file.read(MOST_MARKED)
-            is_own = any(mark in text for mark in known)
+            is_own = any(all(part in text for part in mark) for mark in known)
             if not is_own:
                 raise Refused(f"{folder / name} was not written by Candela and is not replaced; choose another folder.")
     for name in beside:

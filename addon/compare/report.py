@@ -20,8 +20,12 @@ from .first_row import Shown
 from .metrics import EMPTY_DEPTH, PathError, display, figures, is_surface
 from .png import data_url, png
 
-# What only pages of Candela have: the mark in page.html, and the title, as those of versions before the mark have it.
-MADE_BY = ('<meta name="generator" content="Candela">', ": Candela against Cycles</title>")
+# What only pages of Candela have: the mark in page.html; and together a title and a line of the style, as those of
+# versions before the mark have them.
+MADE_BY = (
+    ('<meta name="generator" content="Candela">',),
+    (": Candela against Cycles</title>", "--page: #f6f5f2; --card: #ffffff; --ink: #1d1c1a; --dim: #6b675f;"),
+)
 LARGE_WIDTH = 1920  # pixels; wider pictures are averaged down by a whole factor
 SMALL_WIDTH = 640  # of all rows but the first
 GAINS = {"four": 4.0, "sixteen": 16.0}

@@ -151,6 +151,20 @@ def test_signs_of_shifts_and_exponents_are_no_places(text, at):
     assert not drawn_mutations._is_part_of_a_word("a = b < c - d;", 6)
 
 
+@pytest.mark.parametrize(
+    "arguments", [("--tests", "tests"), ("--again",), ("--equivalent", "a"), ("--drawn", "2", "--reason", "none")]
+)
+def test_options_that_would_be_ignored_are_refused(arguments, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(mutations, "RESULTS", tmp_path / "mutations.json")
+    monkeypatch.setattr(mutations, "JUDGED", tmp_path)
+    (tmp_path / "mutations.json").write_text(kept := '{"a": {"state": "survived", "by": ""}}')
+    parser = argparse.ArgumentParser()
+    mutations.add_options(parser)
+    assert mutations.command(parser.parse_args(arguments)) == 2
+    assert "give --" in capsys.readouterr().out
+    assert (tmp_path / "mutations.json").read_text() == kept and len([*tmp_path.iterdir()]) == 1
+
+
 def test_a_drawn_wrong_that_nothing_can_notice_keeps_its_reason_and_is_not_judged(monkeypatch, tmp_path, capsys):
     kept = {
         "a.py:1 constant 1.0 -> 1.05": {"state": SURVIVED, "by": "", "line": "a = 1.0", "column": 4},
@@ -173,5 +187,8 @@ def test_a_drawn_wrong_that_nothing_can_notice_keeps_its_reason_and_is_not_judge
     assert run("--equivalent", next(iter(kept))) == 2  # no reason
     assert run("--equivalent", next(iter(kept)), "--reason", "nobody reads it") == 0
     assert run("--again") == 0
+    killed = next(name for name, about in json.loads((tmp_path / "mutations_1.json").read_text()).items()
+                  if about["state"] == mutations.KILLED)  # fmt: skip
+    assert run("--equivalent", killed, "--reason", "nobody reads it") == 2
     assert "1 of 2 noticed, 1 equivalent" in capsys.readouterr().out
     assert json.loads((tmp_path / "mutations_1.json").read_text())[next(iter(kept))]["by"] == "nobody reads it"

@@ -1,11 +1,13 @@
 """What drafts of a moving view are compared with."""
 
+from types import SimpleNamespace
+
 import bpy  # noqa: F401 (gpu is its)
 import numpy as np
 import pytest
 
 from addon.film.filter import taps
-from bench.orbit import through_film
+from bench.orbit import AFTER, through_film, too_few
 
 
 def test_a_film_spreads_a_bright_pixel_by_its_weights():
@@ -18,6 +20,13 @@ def test_a_film_spreads_a_bright_pixel_by_its_weights():
     np.testing.assert_allclose(seen[0, 4:7, 0], weights, atol=1e-12)
     assert seen[1].max() == 0.0
     assert through_film(np.ones((9, 12, 3)), 1.5) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("steps", range(1, 9))
+def test_steps_after_an_edit_are_all_drawn_or_refused(steps):
+    edit = range(steps // 2, steps // 2 + AFTER)
+    assert too_few(SimpleNamespace(ways=["edit"], steps=steps)) == (not {*edit} <= {*range(steps)})
+    assert not too_few(SimpleNamespace(ways=["camera"], steps=steps))
 
 
 def test_a_narrow_film_shows_the_middles_of_pixels():
