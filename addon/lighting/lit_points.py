@@ -21,6 +21,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
@@ -28,6 +30,7 @@ from ..materials import gloss
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
+from . import caustic_casters
 from .point_light import LIGHTING, LIGHTING_WITH_WAYS, PointLight
 
 NAMES = ("position", "normal", "diffuse")  # of the images of shaded points, as surface images are laid out
@@ -38,10 +41,11 @@ REFLECT = passes.fullscreen_program(
     blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_position"), ("VEC4", "out_normal"), ("VEC4", "out_albedo")),
 )
-# The diffuse part alone, the albedo of all, and that of gloss with its roughness in w (below 0: a mirror's).
+# The diffuse part alone, the albedo of all, and that of gloss with its roughness in w (below 0: a caster's).
 REFLECT_APART = replace(
     REFLECT,
     name="what points reflect, gloss apart",
+    textures=(*REFLECT.textures, ("R32F", "hit_material"), ("R32F", "thrown_materials")),
     defines=(*REFLECT.defines, ("GLOSS", "1"), ("SMOOTH_MIRROR", f"{gloss.SMOOTH + 1e-4:.4f}")),
     outputs=tuple(("VEC4", f"out_{name}") for name in (*NAMES, "albedo", "gloss")),
 )
@@ -73,11 +77,11 @@ class LitPoints:
         closures = take_closures(facing.size, records.target.depth)
         hits.shade(frame, technique, facing, records, find(hits, records), closures)
         program = REFLECT_APART if directed else REFLECT
+        textures = {**closure_bindings(closures), "energy_table": frame.materials.energy_table}
+        if directed:
+            textures |= {"hit_material": records.images["hit_material"], "thrown_materials": _thrown_materials(frame)}
         shaded = images.Target(tuple(images.pool.take(*facing.size, "RGBA32F") for _ in program.outputs))
-        passes.fullscreen(
-            program, shaded, blocks={"film_view": frame.view_block},
-            textures={**closure_bindings(closures), "energy_table": frame.materials.energy_table},
-        )  # fmt: skip
+        passes.fullscreen(program, shaded, blocks={"film_view": frame.view_block}, textures=textures)
         for image in closures.colors:
             images.pool.give(image)
         records.give()
@@ -109,3 +113,12 @@ class LitPoints:
         """Drop GPU resources."""
         self._give()
         self._light.release()
+
+
+def _thrown_materials(frame: Frame) -> images.Image:
+    """1 at (m & 255, m >> 8) of each material m that photons answer for as a mirror."""
+    table = np.zeros((len(frame.snapshot.materials) // 256 + 1, 256, 1), np.float32)
+    found = caustic_casters.of(frame)
+    for material in found.mirrors if found is not None else ():
+        table[material >> 8, material & 255] = 1.0
+    return images.upload(table, "R32F")

@@ -31,6 +31,7 @@ from ..gfx.library import Program
 from ..scene import acceleration
 from ..scene.point_tree import COVER
 from ..scene.view import VIEW
+from . import caustic_casters
 from .media import MEDIA, MediaService
 from .point_runs import CLIPS, ROW, TURN, PointRuns, Run
 
@@ -101,9 +102,9 @@ LOBES = passes.fullscreen_program(
     "light of gloss at points",
     "micro/lobes.frag.glsl",
     textures=tuple(("RGBA32F", name) for name in ("sent", "direct", "across", "ways", "gloss", "point_normal")),
-    outputs=tuple(("VEC4", f"out_{name}") for name in ("flux", "ways", "all")),
+    outputs=tuple(("VEC4", f"out_{name}") for name in ("flux", "ways", "thrown", "all")),
 )
-LOBE_TEXTURES = (("RGBA32F", "node_flux"), ("RGBA32F", "node_ways"))  # of programs that look at gloss by direction
+LOBE_TEXTURES = tuple(("RGBA32F", f"node_{name}") for name in ("flux", "ways", "thrown"))  # of gloss by direction
 PROGRAMS = (CLIPS, OF_GROUPS, ARRIVING, SENT, SHARES, PULL_POINTS, PULL)
 DIRECTED_PROGRAMS = (*PROGRAMS, LOBES)  # where the run has gloss apart
 
@@ -142,8 +143,9 @@ def buffer_bindings(frame: Frame, run: Run, side: int, threshold: float, centre_
 
 
 class NodeRadiance:
-    """Radiance of all nodes of a run's tree in this sample, and `lobes`, of what gloss sends by direction (flux and
-    ways, shaders/micro/lobes.frag.glsl), where the run has gloss apart. A technique owns one."""
+    """Radiance of all nodes of a run's tree in this sample, and `lobes`, of what gloss sends by direction (flux, ways
+    and, where mirrors throw caustics, what photons bring of it, shaders/micro/lobes.frag.glsl), where the run has gloss
+    apart. A technique owns one."""
 
     def __init__(self):
         self.image: images.Image | None = None
@@ -161,7 +163,9 @@ class NodeRadiance:
     ) -> Iterator[None]:  # fmt: skip
         """Direct light at the points, and what of it has been reflected up to `bounces` times, by `groups` groups."""
         leaves = run.tree.leaves
-        self._prepare(4 * leaves, run.directed)
+        found = caustic_casters.of(frame)
+        thrown = found is not None and bool(found.mirrors)
+        self._prepare(4 * leaves, (len(LOBE_TEXTURES) if thrown else 2) if run.directed else 0)
         lit = points.light(frame, technique, run)
         direct = lit[0]
         held = [images.pool.take(*run.size, "RGBA32F"), *lit]
@@ -170,7 +174,7 @@ class NodeRadiance:
             yield
             if run.directed:
                 held += [images.pool.take(*run.size, "RGBA32F") for _ in LOBES.outputs]
-                every = self._send_lobes(frame, technique, run, lit, sent, held[-3:])
+                every = self._send_lobes(frame, technique, run, lit, sent, held[-len(LOBES.outputs) :])
                 direct = every if bounces > 0 else direct
             self._send(frame, technique, run, direct, direct, direct, 0, sent)
             if bounces > 0:
@@ -245,10 +249,10 @@ class NodeRadiance:
             },
         )  # fmt: skip
         frame.count(technique, "passes", 2)
-        for k, image in enumerate(into[:2]):
+        for k, image in enumerate(into[: len(self._of_lobes)]):
             self._of_lobes[k], drawn = self._pulled(run.tree.leaves, image, self._of_lobes[k])
             frame.count(technique, "passes", drawn)
-        return into[2]
+        return into[-1]
 
     def _pulled(self, leaves: int, sent: images.Image, image: images.Image) -> tuple[images.Image, int]:
         """Means of all nodes, in `image` or in the spare one, which takes its place; and how many passes."""
@@ -264,12 +268,12 @@ class NodeRadiance:
             drawn += 1
         return image, drawn
 
-    def _prepare(self, entries: int, directed: bool) -> None:
+    def _prepare(self, entries: int, lobes: int) -> None:
         height = max(-(-entries // images.LIST_WIDTH), 1)
-        if self.image is None or self.image.height != height or len(self._of_lobes) != 2 * directed:
+        if self.image is None or self.image.height != height or len(self._of_lobes) != lobes:
             self.release()
             self.image, self._spare, *self._of_lobes = (
-                images.pool.take(images.LIST_WIDTH, height, "RGBA32F") for _ in range(4 if directed else 2)
+                images.pool.take(images.LIST_WIDTH, height, "RGBA32F") for _ in range(2 + lobes)
             )
 
     def release(self) -> None:

@@ -362,7 +362,13 @@ class ImageSpaceSubsurface(Technique):
     def _gather(self, frame: Frame, lit: tuple[images.Image, images.Image] | None) -> Iterator[None]:
         shown = frame.images
         nothing = self._constant_images((1, 1))[1] if lit is None else None
-        walked = self._walk(frame, lit)
+        walked = [images.pool.take(*(frame.size if lit else (1, 1)), "RGBA32F") for _ in WALKED]
+        if lit is None:
+            images.Target(tuple(walked)).clear()
+        else:
+            found = {"cell_direct": lit[0], "cell_indirect": lit[1], "cell_shapes": self._shapes}
+            yield from walked_light.walk(frame, self, self.points, found, self._lobes, walked)
+            frame.count(self, "passes", 2)
         yield
         points = {
             "cells": self.points.cells[frame.sample % len(self.points.cells)] if lit else nothing,
@@ -403,15 +409,6 @@ class ImageSpaceSubsurface(Technique):
             images.pool.give(image)
         self._whole = [after, before]
         frame.count(self, "passes", 2)
-
-    def _walk(self, frame: Frame, lit: tuple[images.Image, images.Image] | None) -> list[images.Image]:
-        if lit is None:
-            made = [images.pool.take(1, 1, "RGBA32F") for _ in WALKED]
-            images.Target(tuple(made)).clear()
-            return made
-        found = {"cell_direct": lit[0], "cell_indirect": lit[1], "cell_shapes": self._shapes}
-        frame.count(self, "passes")
-        return walked_light.walk(frame, self.points, found, self._lobes, frame.size)
 
     def _give_shapes(self) -> None:
         if self._shapes is not None:

@@ -92,11 +92,13 @@ REGIONS, REGIONS_OF_LEVEL = _regions(True), _regions(False)
 
 
 @cache
-def by_direction(program: Program) -> Program:
-    """The same program of micro-buffers, where gloss at points sends light by direction."""
+def by_direction(program: Program, thrown: bool) -> Program:
+    """The same program of micro-buffers, where gloss at points sends light by direction. `thrown`: without what photons
+    bring of it."""
     return replace(
-        program, name=f"{program.name}, gloss by direction", textures=(*program.textures, *LOBE_TEXTURES),
-        defines=(*program.defines, ("NODE_LOBES", "1")),
+        program, name=f"{program.name}, gloss by direction{', but for photons' * thrown}",
+        textures=(*program.textures, *(LOBE_TEXTURES if thrown else LOBE_TEXTURES[:2])),
+        defines=(*program.defines, ("NODE_LOBES", "1"), *((("NODE_THROWN", "1"),) if thrown else ())),
     )  # fmt: skip
 
 
@@ -266,7 +268,10 @@ class MicroRendering(MultiresRadiosity):
         self, frame: Frame, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
     ) -> Iterator[None]:  # fmt: skip
         """Block after block, so that micro-buffers take little memory, fit an image, and no dispatch takes long."""
-        program = by_direction(program) if self._radiance.lobes else program
+        if self._radiance.lobes:  # photons bring nothing to gloss
+            thrown = "node_thrown" in textures and program is not GLOSSY
+            program = by_direction(program, thrown)
+            textures = {name: image for name, image in textures.items() if thrown or name != "node_thrown"}
         program = asked(frame, program, textures := dict(textures))
         side, leaves = (bindings["constants"][name] for name in ("micro_side", "leaf_count"))
         width, height = size

@@ -1,6 +1,7 @@
 // What gloss at points sends of direct light, by direction: `out_flux`, the integral of its radiance over all directions, and
 // `out_ways`, the mean of these directions times its luminance, so that both are means over what is below a node. w: the
-// area. `out_all`: direct light with the same as of a diffuse surface, for groups, which do not look at directions.
+// area. `out_all`: direct light with the same as of a diffuse surface, for groups, which do not look at directions. `out_thrown`: of
+// the flux what photons bring to diffuse surfaces of the picture, and to no others.
 //
 // The lobe is one of von Mises and Fisher about the mirrored light. Facets of roughness alpha deviate from the normal like
 // one of sharpness 2 / alpha^2, directions that they mirror like one of a quarter of that over the cosine (Wang, Ren, Gong,
@@ -16,9 +17,7 @@ void main()
   float area = sent_fetch(pixel).w;
   vec4 falling = across_fetch(pixel);
   vec3 flux = lobe.rgb * falling.rgb;
-  if (lobe.w < 0.0) {  // what mirrors throw of lamps, photons bring
-    flux *= clamp(1.0 - falling.w / max(mirrored.w, DARK), 0.0, 1.0);
-  }
+  float thrown = (lobe.w < 0.0) ? clamp(falling.w / max(mirrored.w, DARK), 0.0, 1.0) : 0.0;
   bool finite = is_finite(flux.r + flux.g + flux.b) && is_finite(mirrored.x + mirrored.y + mirrored.z + mirrored.w) && mirrored.w > 0.0;
   flux = finite ? max(flux, vec3(0.0)) : vec3(0.0);
   vec3 mean = finite ? mirrored.xyz / mirrored.w : vec3(0.0);
@@ -28,5 +27,6 @@ void main()
   float length_of_mean = (1.0 + exp(-2.0 * sharpness)) / (1.0 - exp(-2.0 * sharpness)) - 1.0 / sharpness;
   out_flux = vec4(flux, area);
   out_ways = vec4(mean * (length_of_mean * luminance(flux)), area);
+  out_thrown = vec4(flux * thrown, area);
   out_all = vec4(direct_fetch(pixel).rgb + flux * (cosine / PI), 0.0);
 }

@@ -47,7 +47,7 @@ void main()
   float pixel_size = pixel_width_at(position);
   float range = window_of_walks(object_texel(first_object + OBJECT_TEXELS * (int(object) - 1)), pixel_size);
   vec3 free_path = max(spread_length_fetch(pixel).xyz, vec3(LEAST_SCALE));
-  float many = float(samples * walks_of_pixel(walks, most_walks, pixel_size, free_path)) / float(FEW_WALKS);
+  float many = float(samples * walks_of_pixel(walks, most_walks, dense_walks, pixel_size, free_path)) / float(FEW_WALKS);
   float narrowness = pow(clamp(many, 1.0, float(samples * samples)), -0.25);
   vec3 wide = max(narrowness * min(PATHS * free_path, vec3(WINDOWS * range)), vec3(PIXELS * narrowness * pixel_size));
   float widest = max_component(wide);

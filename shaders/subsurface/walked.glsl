@@ -62,10 +62,10 @@ float side_of_walk(vec3 facing, vec3 entered, vec3 to_viewer)
   return smoothstep(0.4, 0.9, dot(facing, entered)) * smoothstep(0.0, 0.4, dot(facing, to_viewer));
 }
 
-// Walks of a pixel in a sample, `least` to `most`: 64 or more a square free path, of half of which walks are averaged around
+// Walks of a pixel in a sample, `least` to `most`: `dense` or more a square free path, of half of which walks are averaged around
 // (smooth.frag.glsl), in small pictures as in large ones. A power of two, so that a pixel has as many in each sample.
-int walks_of_pixel(int least, int most, float width, vec3 free_path)
+int walks_of_pixel(int least, int most, float dense, float width, vec3 free_path)
 {
-  float across = 8.0 * width / max(max_component(free_path), 1e-20);
-  return clamp(1 << int(clamp(ceil(2.0 * log2(max(across, 1e-3))), 0.0, 16.0)), least, most);
+  float across = width / max(max_component(free_path), 1e-20);
+  return clamp(1 << int(clamp(ceil(log2(max(dense * across * across, 1e-6))), 0.0, 16.0)), least, most);
 }

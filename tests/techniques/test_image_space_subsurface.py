@@ -1,5 +1,7 @@
 """Light below surfaces: closed forms of planes, invariants, what the methods mean in Cycles, and stress."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from addon import engine
 from addon.gfx import images
 from addon.kernels import diffusion
+from addon.lighting import walked_light
 from addon.techniques import instant_radiosity
 from bench.subsurface_splats import edge
 from tests.techniques.conftest import places
@@ -547,3 +550,16 @@ def test_what_is_painted_opaque_lets_no_light_through(stage, method):
     stage.camera_above(1.6)
     picture = shown(stage.render(4, size=(24, 24)))[..., 0]
     assert picture[:, :9].mean() > 0.3 and picture[:, 14:].max() < 0.02
+
+
+def test_walks_of_a_pixel_are_those_of_the_whole_picture():
+    """A pixel as wide as a free path had 16 walks in every sample, however many samples there were."""
+
+    def dense(samples, draft=False):
+        schedule = SimpleNamespace(is_draft=draft)
+        settings = SimpleNamespace(samples=samples, schedule=schedule)
+        return walked_light.walks_of(SimpleNamespace(settings=settings))["dense_walks"]
+
+    assert dense(1) == dense(16) == walked_light.FEW_DENSE
+    assert 128 * dense(128) == 1024 * dense(1024) == walked_light.DENSE
+    assert dense(1, draft=True) == 1.0

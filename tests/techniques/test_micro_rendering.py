@@ -333,3 +333,23 @@ def test_light_goes_on_beyond_what_stands_on_a_piece(stage, render):
     assert many.mean() > 0.1
     few = render(1, points=64, samples=8)  # all runs of points
     assert few.mean() == pytest.approx(many.mean(), rel=0.08)  # dark beyond the fins: .62
+
+
+@pytest.mark.parametrize("metallic", [1.0, 0.4])
+def test_mirrored_light_comes_by_way_of_a_wall_that_is_not_in_view(stage, render, metallic):
+    """As much as of metal so rough that it throws no photons, which bring what mirrors throw to the picture alone: of a
+    mirror nothing came by way of the wall. A material of Metallic .4 throws none."""
+    metal = stage.principled(Base_Color=(0.9, 0.9, 0.9, 1), Metallic=metallic, Roughness=0.2)
+    stage.rectangle((-0.4, -0.4), (0.4, 0.4), 0.0, material=metal)
+    stage.rectangle((0.6, -0.6), (1.8, 0.6), 0.0, material=stage.diffuse(0.8))
+    wall = [(2, -2, 0), (2, 2, 0), (2, 2, 4), (2, -2, 4)]
+    stage.mesh(wall, [(0, 3, 2, 1)], material=stage.diffuse(0.8))
+    other = stage.material("ShaderNodeBsdfGlossy", Roughness=0.1)  # for which photons answer
+    stage.rectangle((-4, -4), (-3.9, -3.9), -1.0, material=other)
+    spot = {"energy": 500.0, "spot_size": 0.25, "spot_blend": 0.0, "shadow_soft_size": 0.0}
+    stage.light("SPOT", (-1.5, 0, 1.5), (0, -np.pi / 4, 0), **spot)
+    camera = stage.camera((1.2, 0, 5), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
+    mirror = render(2, samples=4, size=(12, 12), points=2048).mean()
+    metal.node_tree.nodes[0].inputs["Roughness"].default_value = 0.26
+    assert mirror == pytest.approx(render(2, samples=4, size=(12, 12), points=2048).mean(), rel=0.1)
