@@ -43,7 +43,7 @@ from ..frame.technique import Param
 from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..kernels import lists
-from ..lighting import lit_points, micro_buffers
+from ..lighting import caustic_casters, lit_points, micro_buffers
 from ..lighting.asked import asked
 from ..lighting.micro_buffers import (
     BUFFER_CONSTANTS,
@@ -177,7 +177,9 @@ class MicroRendering(MultiresRadiosity):
         regions = REGIONS if context.counts_in_images() else REGIONS_OF_LEVEL
         if not any(may_mirror(one.graph) for one in snapshot.materials):
             return SEES, *lit_points.PROGRAMS, *micro_buffers.PROGRAMS, regions, REFLECTED
-        seen = by_direction(regions), by_direction(GLOSSY)
+        found = caustic_casters.casters_of(snapshot)
+        thrown = not isinstance(found, str) and bool(found.mirrors)
+        seen = by_direction(regions, thrown), by_direction(GLOSSY, False)
         return SEES, *lit_points.DIRECTED_PROGRAMS, *micro_buffers.DIRECTED_PROGRAMS, *seen, REFLECTED
 
     def begin(self, frame: Frame) -> None:
