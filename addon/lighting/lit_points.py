@@ -71,8 +71,7 @@ class LitPoints:
     ) -> images.Target:  # fmt: skip
         """Place, normals and albedo of points, images of the pool in the order of NAMES; position.w is 0 where there is
         none. `directed`: gloss apart, in the order of REFLECT_APART. `facing`: the direction in which each is looked
-        at; `find` fills in the records and returns the materials
-        that may be there (Hits.trace, Hits.place)."""
+        at; `find` fills in the records and returns the materials that may be there (Hits.trace, Hits.place)."""
         hits, records = frame.kept(Hits), Records.take(facing.size)
         closures = take_closures(facing.size, records.target.depth)
         hits.shade(frame, technique, facing, records, find(hits, records), closures)

@@ -24,9 +24,9 @@ Sources: Kulla & Fajardo 2012; Veach & Guibas 1995 (balance heuristic). In mirro
 where light scatters more often another one.
 
 Bias: below FEW samples shafts are as wide as four pixels at least. Penumbrae of round lamps where walks end are those
-of points in a ball. Phase functions mixed at one place are one of their mean anisotropy. Rough lobes and
-drafts show no light of media, mirrors and glass no beams, and surfaces that those show get none from media. Of a ray
-that crosses more than twelve boundaries only the nearest twelve are known, and how often the others lead out.
+of points in a ball. Phase functions mixed at one place are one of their mean anisotropy. Gloss that no rays follow (all
+of it in drafts) gets light of media as if from all sides alike. Mirrors and glass show no beams; surfaces that those
+show get no light from media. Of a ray that crosses more than twelve boundaries only the nearest twelve are known.
 """
 
 from __future__ import annotations

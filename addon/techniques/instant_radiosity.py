@@ -27,7 +27,7 @@ bound: what metal mirrors of other surfaces comes along them alone, followed ove
 
 Bias (diffuse and glossy indirect light): that of virtual_lights.py; near corners the last bounces before the limit may
 be counted once more than allowed. Fails: grain in few samples where virtual lights are partly hidden; caustics are
-spread as by roughness 0.5 and more; none above 4 million triangles. Figures: docs/log/2026-11-26-indirect-light.md.
+spread as by roughness 0.5 or more; no indirect light above 4 million triangles (docs/log/2026-11-26-indirect-light.md).
 """
 
 from __future__ import annotations

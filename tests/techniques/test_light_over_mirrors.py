@@ -1,7 +1,7 @@
 """Diffuse light that arrives by way of smooth metal (floor, mirror, floor), against Cycles' diffuse indirect pass.
 
-Lamps are wide enough for Cycles to find them in the metal. The `dark` half of a
-picture is that of its blocks to which Cycles brings less than the median.
+Lamps are wide enough for Cycles to find them in the metal. The `dark` half of a picture is that of its blocks to which
+Cycles brings less than the median.
 """
 
 import bpy
