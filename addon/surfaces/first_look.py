@@ -71,7 +71,7 @@ LAMPS_SEEN = passes.fullscreen_program(
     "surface/first_look_lamps.frag.glsl",
     textures=(("RGBA16F", "guide"),),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(("INT", "light_count"),),
+    constants=(("INT", "light_count"), ("FLOAT", "known")),  # alpha of glow, which adds up with a surface's
     defines=(("LIGHT_KINDS", str(lights.LAMPS)),),
     outputs=(("VEC4", "out_glow"),),
 )
@@ -91,7 +91,7 @@ FILL = passes.fullscreen_program(
 FILLED = 0.1  # radiance of a white surface that faces the eye, by the exposure, in place of indirect light
 SOLID = 0.9  # opacity from which on a surface hides what is behind
 FAINT = 0.02  # radiance, by the exposure, that is as good as black where colours are compared
-EVEN, VARIED = 1.0, 0.5  # alpha of glow: its colour is known; only the mean of its surface is
+EVEN, VARIED = 1.0, 0.5  # alpha of glow: its colour is known; only the coarse picture's mean of its surface is
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,7 @@ class FirstLook:
         self._sources = lights.Sources()
         self._glow: images.Image | None = None  # what surfaces emit, and lamps; alpha as of `flat_glow`
         self._glows = False  # something is in it
+        self._dims = False  # something that lets light pass may stand before it, and is not in the guide
         self._rows = np.zeros((4, 4))  # of the view
 
     @property
@@ -150,15 +151,16 @@ class FirstLook:
         images.Target((self._target.colors[0],)).clear((0.0,) * 4 if fills else background(snapshot))
         rows = self._rows = np.array([values[row] for row in ("row_x", "row_y", "row_w", "row_q")])
         self._glows = False
-        shown = [
-            call for call in calls(geometry.draws, np.flatnonzero(geometry.boxes.seen(rows)))
-            if not _is_left_out(materials[call.draw.material], guides)
-        ]  # fmt: skip
+        met = list(calls(geometry.draws, np.flatnonzero(geometry.boxes.seen(rows))))
+        shown = [call for call in met if not _is_left_out(materials[call.draw.material], guides)]
+        self._dims = guides and any(
+            _lets_pass(m) and m.glass is None for m in (materials[c.draw.material] for c in met)
+        )
         self._draw(self._target, shown, geometry, lambda k: _look_of(materials[k], guides, fills))
         shining = [call for call in shown if guides and materials[call.draw.material].emissive]
         if shining:
             target = images.Target((self._begin_glow(), self.guide), self._target.depth)
-            self._draw(target, shining, geometry, lambda k: _glow_of(materials[k]))
+            self._draw(target, shining, geometry, lambda k: _glow_of(materials[k], self._dims))
         return self._target.colors[0]
 
     def _draw(
@@ -223,7 +225,8 @@ class FirstLook:
         low, high = zip(*(rows[id(one)] for one in seen))
         passes.fullscreen(
             LAMPS_SEEN, images.Target((self._begin_glow(),)), blend="ADDITIVE_PREMULT", rows=(min(low), max(high)),
-            textures={"guide": self.guide}, constants={"light_count": len(seen)},
+            textures={"guide": self.guide},
+            constants={"light_count": len(seen), "known": VARIED / 2.0 if self._dims else EVEN},
             blocks={
                 "film_view": self._view, "sources": self._sources.set([one.row(one.centre, 0, 0) for one in seen]),
             },
@@ -276,11 +279,12 @@ def _look_of(material: CompiledMaterial, guides: bool, fills: bool) -> dict[str,
     }  # fmt: skip
 
 
-def _glow_of(material: CompiledMaterial) -> dict[str, tuple[float, ...]]:
-    """The same where it alone is drawn."""
+def _glow_of(material: CompiledMaterial, dimmed: bool) -> dict[str, tuple[float, ...]]:
+    """The same where it alone is drawn. `dimmed`: something that the guide leaves out may stand before it."""
     front, behind = _radiance_of(material)
+    known = VARIED if dimmed or material.uneven_emission else EVEN
     return {
-        "flat_color": (0.0, 0.0, 0.0, 1.0), "flat_glow": (*front, VARIED if material.uneven_emission else EVEN),
+        "flat_color": (0.0, 0.0, 0.0, 1.0), "flat_glow": (*front, known),
         "flat_glow_behind": tuple(behind),
     }  # fmt: skip
 

@@ -134,9 +134,9 @@ class Display:
 
 
 def emitted_in(frame: Frame) -> Emitted | None:
-    """What a draft shows of what emits; None where it does not hold that apart, or media dim it. Lamps whose node trees
-    vary are left to the draft's own pixels."""
-    if EMISSION not in frame.images or has_media(frame.snapshot):
+    """What a draft shows of what emits; None where it does not hold that apart, media dim it, or the picture that is
+    shown is more than the mean of samples. Lamps whose node trees vary are left to the draft's own pixels."""
+    if EMISSION not in frame.images or has_media(frame.snapshot) or frame.picture != Frame.picture:
         return None
     lamps = [one for one in frame.emitters if one.flags & CAMERA_FLAG and not one.flags & MAPPED_FLAG]
     exposure = frame.snapshot.film.exposure

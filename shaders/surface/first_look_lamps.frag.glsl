@@ -19,5 +19,5 @@ void main()
     vec3 radiance = light_hit(light_read(i), origin, direction, hit_distance, density);
     sum += hit_distance < limit ? radiance : vec3(0.0);
   }
-  out_glow = vec4(min(sum, vec3(60000.0)), dot(sum, vec3(1.0)) > 0.0 ? 1.0 : 0.0);
+  out_glow = vec4(min(sum, vec3(60000.0)), dot(sum, vec3(1.0)) > 0.0 ? known : 0.0);
 }

@@ -261,6 +261,34 @@ def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, wh
     assert shown.sum() == pytest.approx(whole.sum(), rel=0.15)
 
 
+def test_draft_shows_what_glows_behind_a_red_pane_in_red(scene, region, whole_guides):
+    """What lets light pass is not in the guide: what shone behind it stood there in full, and white."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.3, location=scene.camera.matrix_world @ Vector((0.0, 0.0, -3.0)))
+    material = material_named("Glow")
+    material.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    material.node_tree.nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 20.0
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.mesh.primitive_plane_add(size=4.0, location=scene.camera.matrix_world @ Vector((0.0, 0.0, -1.0)))
+    bpy.context.object.rotation_euler = scene.camera.rotation_euler
+    pane = material_named("Pane")
+    nodes = pane.node_tree.nodes
+    red = nodes.new("ShaderNodeBsdfTransparent")
+    red.inputs["Color"].default_value = (0.8, 0.01, 0.01, 1.0)
+    pane.node_tree.links.new(red.outputs[0], nodes["Material Output"].inputs["Surface"])
+    bpy.context.object.data.materials.append(pane)
+    region.viewport.dirty = True
+    whole = region.rest()[..., :3]
+    bright = whole[..., 0] > 5.0
+    assert bright.sum() > 100
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.01}
+    region.camera = region.moved(1e-4)
+    region.draw()
+    assert region.viewport.scale == 4
+    shown = images.read(region.viewport.display.shown)[..., :3]
+    assert shown[bright].mean(axis=0)[1] < 0.1 * shown[bright].mean(axis=0)[0]
+    assert shown.sum() == pytest.approx(whole.sum(), rel=0.2)
+
+
 def test_draft_shows_how_emission_varies_over_a_surface(scene, region, whole_guides):
     """A floor that glows from 0 on the left to 4 on the right: not in its mean colour everywhere."""
     material = material_named("Screen")
