@@ -226,17 +226,25 @@ def drawn_stochastically(frame: Frame, stopped: frozenset[int] = frozenset()) ->
 
 
 def by_rays(
-    frame: Frame, views: Callable[[], list], resolution: int, technique: Technique | None = None, of: str = "light"
+    frame: Frame,
+    views: Callable[[], list],
+    resolution: int,
+    technique: Technique | None = None,
+    of: str = "light",
+    needed: bool = False,
 ) -> bool:
     """Whether rays take the place of maps. `views` makes those of such a map, where they are asked for; without any
-    there is no shadow to trace. The ledger's row of the `technique` says why, `of` which light."""
+    there is no shadow to trace. The ledger's row of the `technique` says why, `of` which light. `needed`: maps do
+    not know what casters let pass."""
     wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
     if wanted in (BY_MAPS, BY_POINTS) or frame.settings.schedule.is_draft or acceleration.too_many(frame.snapshot):
         return False
-    if drawn_stochastically(frame) or frame.shared(Layers).of:  # maps ask the material itself; rays know it by cells
+    if not needed and (
+        drawn_stochastically(frame) or frame.shared(Layers).of
+    ):  # maps ask the material itself; rays know it by cells
         return False
     asked = views()
-    if not asked or wanted == BY_RAYS:
+    if not asked or wanted == BY_RAYS or needed:
         return bool(asked)
     found = rays_beside(frame, asked, resolution)
     far_off = found.by_rays and _far_off(frame)

@@ -54,12 +54,16 @@ class Reflectance:
     def __init__(self):
         self._keys: dict[int, object] = {}  # by material: of what its cell shows
         self.image: images.Image | None = None
+        self.mirrors_box = np.zeros(
+            (2, 3)
+        )  # low and high corner around all that mirrors, relative to the scene's origin
 
     def update(self, frame: Frame) -> None:
         """Draw anew the materials that have changed or whose surfaces have."""
         self._update(frame)
         owned = MIRRORS_OWNED if frame.plan.owns(LIGHT_SPECULAR_DIFFUSE) else ()
         mirrors = MIRRORS if any(smooth_metal(frame, k) for k in frame.snapshot.used_materials) else ()
+        self.mirrors_box = _mirrors_box(frame)
         dropped = () if frame.snapshot.film.caustics_reflective else MIRRORS_DROPPED
         turned = TURNED if _turns_normals(frame) else ()
         self.image.defines = (*owned, *mirrors, *dropped, *turned)
@@ -119,6 +123,23 @@ class Reflectance:
 def _throws_caustics(frame: Frame, material: int) -> bool:
     """As lighting/caustic_casters.py has it: polish over another surface does not, however dark that is."""
     return smooth_metal(frame, material) or frame.materials.compiled[material].glass is not None
+
+
+def _mirrors_box(frame: Frame) -> np.ndarray:
+    """(2, 3) corners of a box around all objects of `_throws_caustics`, with a margin for those that are flat."""
+    own = {k for k in frame.snapshot.used_materials if _throws_caustics(frame, k)}
+    boxes = []
+    for one in frame.snapshot.instances if own else ():
+        mesh = frame.snapshot.meshes[one.mesh]
+        if not own.isdisjoint(one.materials) and mesh.triangle_count and np.isfinite(one.matrix).all():
+            centre, half = (mesh.bounds_min + mesh.bounds_max) / 2, (mesh.bounds_max - mesh.bounds_min) / 2
+            world, reach = one.matrix[:3, :3] @ centre + one.matrix[:3, 3], np.abs(one.matrix[:3, :3]) @ half
+            boxes.append((world - reach, world + reach))
+    if not boxes:
+        return np.zeros((2, 3))
+    low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
+    margin = 1e-3 * np.linalg.norm(high - low) + 1e-5 * frame.geometry.size
+    return np.stack([low - margin, high + margin]) - frame.geometry.origin
 
 
 def smooth_metal(frame: Frame, material: int) -> bool:

@@ -267,7 +267,8 @@ class EnvironmentLight(Technique):
 
     def _traces(self, frame: Frame, resolution: int) -> bool:
         """Whether rays take the place of maps."""
-        return by_rays(frame, lambda: self._usual_views(frame, resolution), resolution, self, "the world")
+        below = _has_sheets(frame)
+        return by_rays(frame, lambda: self._usual_views(frame, resolution), resolution, self, "the world", below)
 
     @staticmethod
     def _usual_views(frame: Frame, resolution: int) -> list:
@@ -368,6 +369,13 @@ def _patch(
     if flags & lights.GLASS_BLOCKS_FLAG:
         views = [replace(view, glass_blocks=True) if hasattr(view, "glass_blocks") else view for view in views]
     return LightPoint(sun.row(direction, 0, len(views), rate=rate.per_sample), provider, views)
+
+
+def _has_sheets(frame: Frame) -> bool:
+    """Whether some glass is a single sheet, which lets pass less of the world's light than its faces do."""
+    glass = any(frame.materials.compiled[k].glass is not None for k in frame.snapshot.used_materials)
+    hierarchy = frame.hierarchy("shadow") if glass else None
+    return hierarchy is not None and set(acceleration.SHEETS) <= set(hierarchy.leaves.defines)
 
 
 def _cast_shadows(frame: Frame) -> bool:

@@ -63,6 +63,7 @@ from ..sampling.interleaved import Interleaving, interleaving
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import ANY_SURFACE, LIT_SURFACES, MARKS
+from ..surfaces.reflectance import Reflectance
 
 DEEPER = 2  # samples, one of which looks for light that close surfaces reflect to each other again and again
 DEEPER_ORDER = (0, 0, 1, 1, 1, 1, 0, 0)  # which of each two: of 16, all numbers of the sequence in each quarter twice
@@ -75,8 +76,9 @@ LOBE_RAYS = 4  # of a pixel in a sample, where a glossy lobe is most of what is 
 GATHER_TEXTURES = (("RGBA32F", "virtual_lights"), *PATH_TEXTURES)
 NEAR_CONSTANTS = (
     ("INT", "bounces"), ("INT", "virtual_count"), ("FLOAT", "near_radius"), ("FLOAT", "glossy_radius"),
-    ("FLOAT", "deeper"),
+    ("FLOAT", "deeper"), ("VEC3", "mirrors_low"), ("VEC3", "mirrors_high"),
 )  # fmt: skip
+NOTHING_NEAR = {name: (0.0, 0.0, 0.0) if kind == "VEC3" else 0 for kind, name in NEAR_CONSTANTS}  # no light, no bounce
 GATHER_CONSTANTS = (
     *dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)),
     ("INT", "lobe_rays"),
@@ -171,6 +173,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
     bindings["constants"] |= {
         "deeper": deeper_weight(frame),
+        **dict(zip(("mirrors_low", "mirrors_high"), frame.kept(Reflectance).mirrors_box)),
         "lobe_rays": 1 if frame.settings.schedule.is_draft else LOBE_RAYS,
     }
     bindings["constants"] |= {"shaded_roughness": shaded_roughness(frame), **constants}

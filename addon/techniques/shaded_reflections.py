@@ -85,7 +85,7 @@ from ..surfaces.hits import (
     take_closures,
 )
 from .environment_light import directions_rate
-from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
+from .instant_radiosity import NEAR_CONSTANTS, NOTHING_NEAR, GatherBindings
 
 WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
 EMISSIVE_POINTS, FEW_EMISSIVE_POINTS = 4, 16  # the second in pictures of fewer than FEW samples
@@ -488,7 +488,7 @@ class ShadedReflections(Technique, BothWays):
         hierarchy = frame.hierarchy("diffuse")
         repeats = max(-(-MORE_RAYS // frame.settings.samples), 1) if reach["ray_number"] < 2 else 1
         provided = frame.service(GatherBindings)
-        near = {name: 0 for _, name in NEAR_CONSTANTS}
+        near = NOTHING_NEAR
         nothing = frame.materials.energy_table
         textures = {"virtual_lights": nothing, "reflectance": nothing}
         if provided is not None:

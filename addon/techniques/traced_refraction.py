@@ -56,7 +56,7 @@ from ..sources.environment import WORLD
 from ..surfaces.draw import LEFT_OUT, SURFACE_TEXTURES, SURFACES, draw_surfaces, surface_bindings
 from ..surfaces.edits_at_hits import EditsAtHits
 from ..surfaces.reflectance import Reflectance
-from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
+from .instant_radiosity import NEAR_CONSTANTS, NOTHING_NEAR, GatherBindings
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
@@ -213,7 +213,7 @@ class TracedRefraction(Technique):
         """Virtual lights and NEAR_CONSTANTS; where nothing provides them, of none and no bounces."""
         provided = frame.service(GatherBindings)
         if provided is None:
-            return self._table, {name: 0 for _, name in NEAR_CONSTANTS}
+            return self._table, NOTHING_NEAR
         constants = {name: provided.bindings["constants"][name] for _, name in NEAR_CONSTANTS}
         return provided.bindings["textures"]["virtual_lights"], constants
 

@@ -3,16 +3,26 @@
 // Virtual lights are bounded where they are near: one at distance d counts min(1, d2 / r2) of its light, a ray that meets a
 // surface at distance d counts 1 - min(1, d2 / r2) of what that sends. What smooth metal mirrors of other surfaces virtual
 // lights do not send (indirect/candidates.frag.glsl): rays meet that at any distance, and go on over the mirror. A program
-// that includes this has the constants `virtual_count`, `near_radius`, `glossy_radius` and `deeper` besides those of
-// indirect/path.glsl.
+// that includes this has the constants `virtual_count`, `near_radius`, `glossy_radius` and `deeper`, and of the box
+// around all mirrors `mirrors_low` and `mirrors_high`, besides those of indirect/path.glsl.
 #include "indirect/path.glsl"
 #include "indirect/lights.glsl"
 
+// How far along a ray mirrors may stand: up to where it leaves the box around all of them.
+float mirror_limit(vec3 origin, vec3 direction)
+{
 #ifdef MIRRORS_DROPPED
-#define MIRROR_LIMIT 0.0
+  return 0.0;
 #else
-#define MIRROR_LIMIT 1e29  // how far away rays look for mirrors
+  vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
+  vec3 low = (mirrors_low - origin) * inverse;
+  vec3 high = (mirrors_high - origin) * inverse;
+  vec3 first = min(low, high);
+  vec3 last = max(low, high);
+  float leave = min(min(last.x, last.y), last.z);
+  return (max(max(first.x, first.y), first.z) <= leave) ? max(leave, 0.0) : 0.0;
 #endif
+}
 
 // Where a ray is on its way.
 struct Walk {
@@ -44,7 +54,8 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     if (!walk.has_met) {
       float t;
       float limit = walk.whole ? 1e29 : reach;
-      if (!trace_vertex(walk.origin, walk.direction, limit, MIRROR_LIMIT, roll.z, walk.met, t)) {
+      float last_mirror = mirror_limit(walk.origin, walk.direction);
+      if (!trace_vertex(walk.origin, walk.direction, limit, last_mirror, roll.z, walk.met, t)) {
         break;
       }
       share = walk.whole ? 1.0 : max(1.0 - t * t / (reach * reach), 0.0);

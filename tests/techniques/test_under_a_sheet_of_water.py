@@ -41,3 +41,11 @@ def test_frosted_water_mirrors_back_as_much_as_clear_water(stage):
         stage.scene.camera.location.z = -0.05  # below the sheet
         found.append(light_paths(stage.render(16, (16, 16), bounces=24))["diffuse_indirect"].mean())
     assert found[1] == pytest.approx(found[0], rel=0.05)
+
+
+def test_a_ground_that_the_camera_sees_below_water_has_the_light_that_leaves_it(stage):
+    """Of the world's light on the ground itself: t = (1 - F) / n2, as above."""
+    pool(stage)
+    stage.scene.camera.location.z = -0.05
+    light = light_paths(stage.render(8, (16, 16), bounces=0))["diffuse_direct"].mean()
+    assert light == pytest.approx(0.5 * pane_passing(1.33)[1] / 1.33**2, rel=0.03)
