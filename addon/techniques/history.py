@@ -179,7 +179,7 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
     sharp = float(bool(before.lamps and before.moved) or any(_outruns_penumbra(*pair) for pair in before.lamps))
     counts = (len(lamps), float(not lamps), most, sharp)
     rows = [*before.rows[:3], (*(origin - before.origin), len(before.moved)), counts]
-    meshes = frame.snapshot.meshes
+    meshes, emissive = frame.snapshot.meshes, [material.emissive for material in frame.materials.compiled]
     for one in frame.snapshot.instances:
         if one.key not in before.moved:
             continue
@@ -188,7 +188,7 @@ def _table(frame: Frame, before: Before | None) -> np.ndarray:
             *_between(moved, origin, before.origin),
             *_into_box(one.matrix, mesh, origin),
             *_into_box(moved @ one.matrix, mesh, before.origin),
-            *_sphere(moved, one.matrix, mesh, origin),
+            *_sphere(moved, one.matrix, mesh, origin, any(emissive[k] for k in one.materials)),
         ]
     rows += [
         (*one.centre, -1.0 - np.tan(one.radius) if one.kind == lights.SUN else one.reach) for one in lamps
@@ -257,15 +257,17 @@ def _between(matrix: np.ndarray, now: np.ndarray, then: np.ndarray) -> np.ndarra
     return out
 
 
-def _sphere(moved: np.ndarray, matrix: np.ndarray, mesh, origin: np.ndarray) -> np.ndarray:
+def _sphere(moved: np.ndarray, matrix: np.ndarray, mesh, origin: np.ndarray, emits: bool = False) -> np.ndarray:
     """(2, 4) the sphere around an object's box: middle, relative to the origin, and radius; how far a corner of the box
-    has moved at most, m."""
+    has moved at most, m, and whether the object emits."""
     sides = np.array([mesh.bounds_min, mesh.bounds_max])
     corners = np.stack(np.meshgrid(*sides.T), axis=-1).reshape(8, 3) @ matrix[:3, :3].T + matrix[:3, 3]
     then = corners @ moved[:3, :3].T + moved[:3, 3]
     middle = corners.mean(axis=0)
     radius = np.linalg.norm(corners - middle, axis=1).max()
-    return np.array([(*(middle - origin), radius), (np.linalg.norm(then - corners, axis=1).max(), 0.0, 0.0, 0.0)])
+    return np.array(
+        [(*(middle - origin), radius), (np.linalg.norm(then - corners, axis=1).max(), float(emits), 0.0, 0.0)]
+    )
 
 
 def _into_box(matrix: np.ndarray, mesh, origin: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@
 //   1  how many lamps; y: 1 where there is other light than theirs; z: pictures that light counts for at most, since
 //      lamps have moved; w: 1 where their shadows may have moved by more than they are blurred
 //   11 of each object: from where it is to where it was; to its box, within -1..1, now and then; the middle and radius of
-//      the sphere around it; how far it has moved
+//      the sphere around it; how far it has moved, y: 1 where it emits
 //   1  of each lamp: place and reach, or the way to a sun and -1 - tangent of its radius
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
@@ -175,16 +175,20 @@ bool may_have_changed(vec3 position, vec3 shift, int moved)
 
 // Pictures that bounced light counts for at most beside what moves. n of them have the squared error (n c)^2 by their lag
 // and noise / 2n, where c is the share of the hemisphere that a step changes: least at the n below. A sphere of radius r
-// that moves by m at the distance d covers 2 r m of d^2 anew and uncovers as much; of its light half differs on average.
+// that moves by m at the distance d covers 2 r m of d^2 anew and uncovers as much; of its light half differs on average. What
+// emits changes all light that others throw on, by any amount.
 float most_beside(vec3 position, int moved)
 {
   float change = 1e-6;
   for (int k = 0; k < moved; k++) {
     vec4 sphere = table(OBJECTS + TEXELS * k + 9);
-    float moves = table(OBJECTS + TEXELS * k + 10).x;
+    vec4 shifted = table(OBJECTS + TEXELS * k + 10);
+    if (shifted.y > 0.5) {
+      return most_moved;
+    }
     vec3 way = position - sphere.xyz;
     float radius = max(sphere.w, 1e-6);
-    change += radius * moves / (PI * max(dot(way, way), radius * radius));
+    change += radius * shifted.x / (PI * max(dot(way, way), radius * radius));
   }
   return pow(draft_noise / (4.0 * change * change), 1.0 / 3.0);
 }

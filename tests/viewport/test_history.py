@@ -212,3 +212,18 @@ def test_bounced_light_far_from_what_moves_counts_for_more_pictures(scene, draft
     counts = samples_behind(frame)
     assert counts.max() > FEW + 3.0
     assert ((counts > 0) & (counts <= FEW + 1.0)).mean() > 0.01
+
+
+def test_bounced_light_of_what_emits_and_moves_counts_for_few_pictures_everywhere(scene, drafts):
+    """Far from it, too, its light changes by more than what it covers of the hemisphere."""
+    material = bpy.data.materials.new("Glow")
+    material.use_nodes = True
+    material.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    material.node_tree.nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 20.0
+    cube = bpy.data.objects["Cube"]
+    cube.data.materials.clear()
+    cube.data.materials.append(material)
+    for _ in range(8):
+        cube.location.x += 0.02
+        frame = drafts()
+    assert 1.0 < samples_behind(frame).max() <= FEW + 1.0
