@@ -57,6 +57,7 @@ class MaterialSet:
 
     def __init__(self):
         self.compiled: list[CompiledMaterial] = []
+        self._in_use: frozenset[int] = frozenset()  # numbers of those that instances show
         self.notes: tuple[Note, ...] = ()
         self.energy_table: images.Image | None = None
         self._energy_space = ""  # the working space that it was made for
@@ -80,7 +81,7 @@ class MaterialSet:
         if self.energy_table is None or self._energy_space != current().name:
             self.energy_table = images.upload(energy_texture(FINE_LAYERS))
             self._energy_space = current().name
-        before = self.compiled
+        before, self._in_use = self.compiled, snapshot.used_materials
         cache, self.compiled, notes, self.own_images = {}, [], [], {}
         of_strands = _on_strands(snapshot)
         for k, material in enumerate(snapshot.materials):
@@ -192,12 +193,16 @@ class MaterialSet:
     @property
     def soft(self) -> bool:
         """Some material has a lobe of shaders/lib/soft_lobe.glsl, so that programs which light surfaces need it."""
-        return any(compiled.soft for compiled in self.compiled)
+        return any(compiled.soft for compiled in self._shown())
 
     @property
     def glossy(self) -> bool:
         """Some material has a lobe of microfacets, of mirrors or glass."""
-        return any(compiled.glossy or compiled.glass for compiled in self.compiled)
+        return any(compiled.glossy or compiled.glass for compiled in self._shown())
+
+    def _shown(self) -> Iterator[CompiledMaterial]:
+        """Those of instances: what stands for empty slots may be in none."""
+        return (compiled for k, compiled in enumerate(self.compiled) if k in self._in_use)
 
     def fingerprint(self) -> tuple:
         """Equal in two frames if all materials shade alike."""

@@ -175,7 +175,7 @@ class MicroRendering(MultiresRadiosity):
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         regions = REGIONS if context.counts_in_images() else REGIONS_OF_LEVEL
-        if not any(may_mirror(one.graph) for one in snapshot.materials):
+        if not any(may_mirror(snapshot.materials[k].graph) for k in snapshot.used_materials):
             return SEES, *lit_points.PROGRAMS, *micro_buffers.PROGRAMS, regions, REFLECTED
         found = caustic_casters.casters_of(snapshot)
         thrown = not isinstance(found, str) and bool(found.mirrors)

@@ -189,6 +189,7 @@ def test_what_gloss_by_direction_draws_is_among_the_programs_that_are_compiled_a
         monkeypatch.setattr(module, "get", lambda program: drawn.add(program) or get(program))
     render(2, size=(8, 8), samples=1, points=256)
     assert {*foretold} <= drawn
+    assert any("gloss" in one.name for one in drawn) == glossy  # the material of empty slots is in no slot
     missing = {one.name for one in drawn - {*foretold}}
     assert not [name for name in missing if "gloss" in name or "ways" in name], missing
 
