@@ -77,7 +77,7 @@ MAPS_APART = 4  # samples for which rays ask the same map: it costs as much as t
 INTERFACES = Param(
     "interfaces", "Interfaces", 16,
     "Number of glass or mirror surfaces after the first that a photon may meet before a diffuse surface",
-    0, 32,
+    0, 32, draft=8,
 )  # fmt: skip
 
 

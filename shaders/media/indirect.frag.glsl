@@ -459,6 +459,9 @@ void main()
   start.stop.normal = s.normal;
   start.stop.face = s.geometric_normal;
   start.weight = vec3(1.0);
+  // What a translucent lobe reflects comes from the far side: of both one is looked at, at random.
+  float lobe_share = luminance(s.glossy_weight);
+  float far_chance = (s.kind == LOBE_TRANSLUCENT) ? lobe_share / max(lobe_share + luminance(s.diffuse), 1e-30) : 0.0;
   // For what spreads this over the pixels around: light of nothing counts as nothing.
   bool takes = ray.hit && (max_component(s.diffuse) > 0.0 || has_wide_lobe(s, shaded_roughness));
   out_found.w = takes ? min(ray.limit, 1e18) : -1.0;
@@ -487,6 +490,10 @@ void main()
       vec3 straight;
 #ifdef FROM_SURFACES
       const bool media_only = true;
+      float side = (far_chance > 0.0 && media_random(seed) < far_chance) ? -1.0 : 1.0;
+      start.stop.position = ray_origin(s.position, side * s.geometric_normal);
+      start.stop.normal = side * s.normal;
+      start.stop.face = side * s.geometric_normal;
 #else
       const bool media_only = false;
 #endif

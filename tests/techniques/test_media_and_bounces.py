@@ -81,3 +81,17 @@ def test_cloth_that_is_lit_from_behind_lights_the_fog_before_it(stage):
     sheet.data.materials[0] = stage.material("ShaderNodeEmission", Strength=0.6 / np.pi)
     shone = stage.render(64, size=(16, 16), bounces=2)["volume_direct"][..., 0].mean()
     assert lit == pytest.approx(shone, rel=0.05)
+
+
+@pytest.mark.parametrize("shader", ["ShaderNodeBsdfTranslucent", "ShaderNodeBsdfDiffuse"])
+def test_a_sheet_before_fog_that_a_sun_lights_is_lit_through(stage, shader):
+    """As in Cycles. A translucent sheet had the fog's light of the side that is seen, where there is none."""
+    stage.rectangle((-0.4, -0.4), (0.4, 0.4), 0.0, material=stage.material(shader, Color=(0.8, 0.8, 0.8, 1)))
+    box(stage, volume(stage, Color=(1, 1, 1, 1), Density=0.5), (-1, -1, -2), (1, 1, -0.05))
+    stage.light("SUN", turn=(0, np.pi / 2, 0), energy=10.0, angle=0.0)
+    camera = stage.camera((0, 0, 3), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.6
+    seen = [stage.render(n, size=(8, 8), bounces=2, engine=name) for name, n in (("CANDELA", 32), ("CYCLES", 1024))]
+    found, truth = (one["combined"][..., :3].mean() for one in seen)
+    assert found == pytest.approx(truth, rel=0.1, abs=2e-3)
+    assert (truth > 0.05) == (shader == "ShaderNodeBsdfTranslucent")

@@ -223,7 +223,7 @@ def test_bounced_light_of_what_emits_and_moves_counts_for_few_pictures_everywher
     cube = bpy.data.objects["Cube"]
     cube.data.materials.clear()
     cube.data.materials.append(material)
-    for _ in range(8):
+    for _ in range(14):
         cube.location.x += 0.02
         frame = drafts()
     assert 1.0 < samples_behind(frame).max() <= FEW + 1.0
