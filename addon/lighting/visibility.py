@@ -239,9 +239,8 @@ def by_rays(
     wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
     if wanted in (BY_MAPS, BY_POINTS) or frame.settings.schedule.is_draft or acceleration.too_many(frame.snapshot):
         return False
-    if not needed and (
-        drawn_stochastically(frame) or frame.shared(Layers).of
-    ):  # maps ask the material itself; rays know it by cells
+    layered = drawn_stochastically(frame) or frame.shared(Layers).of
+    if layered and not needed:  # maps ask the material itself; rays know it by cells
         return False
     asked = views()
     if not asked or wanted == BY_RAYS or needed:

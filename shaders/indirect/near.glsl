@@ -63,7 +63,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       throughput *= passing_media(walk.origin, walk.direction, t, roll.y);
 #ifdef SMOOTH_MIRRORS
       mirrored = mirror_drawn(walk.met, -walk.direction, to_unit(hash3(roll).y), !walk.whole);
-      if (farther && deeper < 0.0 && !mirrored) {
+      if (farther && deeper < 0.0 && !mirrored && !walk.whole) {
         break;
       }
 #endif

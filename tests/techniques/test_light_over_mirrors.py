@@ -112,6 +112,21 @@ def test_without_reflective_caustics_metal_sends_no_light_to_rough_surfaces(stag
     assert ours[..., :3].mean() == pytest.approx(theirs[..., :3].mean(), rel=0.03)
 
 
+def test_without_near_bounces_light_still_comes_over_mirrors_again(stage):
+    """Floor, ceiling, floor, ceiling, floor: nothing rough stands close to anything."""
+    ceiling(stage)
+    stage.scene.candela.slot_indirect = "multires_radiosity"
+    found = []
+    try:
+        for follows in (True, False):
+            stage.scene.candela.multires_radiosity_near_bounces = follows
+            found.append(diffuse_indirect(stage, "CANDELA", 8).mean())
+    finally:
+        stage.scene.candela.multires_radiosity_near_bounces = True
+        stage.scene.candela.slot_indirect = "AUTO"
+    assert found[1] == pytest.approx(found[0], rel=0.04)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_light_by_way_of_mirrors_is_that_of_cycles(stage, scene):
