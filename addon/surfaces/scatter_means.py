@@ -24,7 +24,7 @@ from .draw import refracts
 from .reflectance import COLUMNS, SIDE, draw_overview, keys_of
 
 BANDS = 3  # of rows in the result, see shaders/subsurface/means.frag.glsl
-ANY_PLACE = 2.0  # w of the image of places: where nothing is compared (shaders/surface/scatter.frag.glsl)
+ANY_PLACE = -1.0  # w of the image of places: where nothing is compared (shaders/surface/scatter.frag.glsl)
 MEANS = passes.fullscreen_program(
     "means of scattering",
     "subsurface/means.frag.glsl",

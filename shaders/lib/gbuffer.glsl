@@ -1,6 +1,6 @@
 // How a surface's closures are laid out in the images of the surface pass (surface.*), written and read here.
 //
-//   position  xyz relative to the render origin; w: 0 nothing hit, 1 surface, up to 2 held out
+//   position  xyz relative to the render origin; w: 0 nothing hit, else 1 or more, see bump_encode
 //   normal    octahedral shading normal of the diffuse closure (xy; of a rough one its weight in the last bits) and of the
 //             triangle (zw; in the last bits smooth_lift)
 //   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each

@@ -20,8 +20,8 @@ void main()
   SurfacePoint point = fragment_point(instance);
   // Interpolated positions of one point differ by some units of the last place between two programs.
   float tolerance = 2e-6 * (length(hit.xyz - film_view.eye.xyz) + length(hit.xyz));
-  // Where means over a material are drawn, all that it has is shown: w is 2.
-  if (hit.w == 0.0 || (hit.w < 1.5 && distance(hit.xyz, point.position) > tolerance)) {
+  // Where means over a material are drawn, all that it has is shown: w is below 0, as that of no surface (bump_encode).
+  if (hit.w == 0.0 || (hit.w > 0.0 && distance(hit.xyz, point.position) > tolerance)) {
     discard;
   }
   point.refracts = glass_bends != 0;

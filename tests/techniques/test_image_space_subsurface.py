@@ -215,6 +215,45 @@ def test_objects_do_not_exchange_light(stage):
     assert picture[:, :15].max() < 0.01 and picture[:, 18:30].min() > 0.1
 
 
+def bumped(material):
+    """The material, its normal turned as by a bump of an even slope."""
+    nodes = material.node_tree.nodes
+    turned = nodes.new("ShaderNodeNormalMap")
+    turned.space = "WORLD"
+    turned.inputs["Color"].default_value = (0.8, 0.5, 0.9, 1.0)
+    material.node_tree.links.new(turned.outputs[0], nodes[0].inputs["Normal"])
+    return material
+
+
+def partly_held_out(material):
+    """A mix of the material and of 0.7 holdout."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    shader, output = nodes[:2]
+    mix = nodes.new("ShaderNodeMixShader")
+    mix.inputs[0].default_value = 0.7
+    links.new(shader.outputs[0], mix.inputs[1])
+    links.new(nodes.new("ShaderNodeHoldout").outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], output.inputs["Surface"])
+    return material
+
+
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+@pytest.mark.parametrize("changed", [bumped, partly_held_out])
+def test_bumped_and_held_out_surfaces_hide_what_scatters_behind_them(stage, weight, changed):
+    """Bumps and holdout stand beside the place that a pixel sees (surface.position): none is the mark of any place."""
+    pictures = []
+    for behind in (1.0, 0.0):
+        stage.clear()
+        front = changed(scattering(stage, scale=1e-5, color=(0.2, 0.5, 0.8), weight=weight))
+        box(stage, front, (-2, -2, 0.1), (2, 2, 0.2))
+        box(stage, scattering(stage, weight=behind), (-2, -2, -1), (2, 2, 0))
+        stage.light("SUN", energy=np.pi)
+        stage.camera_above(1.0)
+        pictures.append(stage.render(2, size=(8, 8))["diffuse_direct"][..., :3])
+    assert pictures[1].min() > 0.01
+    assert pictures[0] == pytest.approx(pictures[1], rel=0.01)
+
+
 @pytest.mark.parametrize("empty", [False, True])
 def test_copies_of_one_mesh_have_their_own_light_in_any_order(stage, empty):
     """Rows of the geometry's image are ordered by place, and meshes without faces have none."""
