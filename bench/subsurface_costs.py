@@ -1,10 +1,11 @@
 """What light below surfaces costs, painted maps and thin parts: `python -m bench subsurface_costs --page`.
 
-Six parts for docs/subsurface.md: the cost of a picture by points, by range in pixels, by resolution and by number of
-materials, beside diffuse ones; three painted scenes (a face with tinted cheeks that are soft or sharp, veins, a candle
-with an opaque wick) with maps and without; walks through slabs from .25 to 8 mean free paths thick that are lit from
-behind, beside Cycles; closed forms of slabs; and dipole splats (subsurface_splats.py). Seconds are medians of renders
-of 4 samples after one that compiled.
+Parts for docs/subsurface.md: the cost of a picture by points, by range in pixels, by resolution and by number of
+materials, beside diffuse ones; painted scenes (a face with tinted cheeks that are soft or sharp, veins, a candle with
+an opaque wick, a leaf and ears lit from behind that glow where they are painted) with maps and without, and a picture
+of the last two; walks through slabs from .25 to 8 mean free paths thick that are lit from behind, beside Cycles; closed
+forms of slabs; and dipole splats (subsurface_splats.py). Seconds are medians of renders of 4 samples after one that
+compiled.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from .subsurface_splats import splats
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "subsurface.md"
 COMMAND = "python -m bench subsurface_costs --page"
 SIZE, SAMPLES, REPEATS, ROUNDS = (96, 96), 4, 2, 4
-PARTS = ("cost", "painted", "thin", "slabs", "splats")
+PARTS = ("cost", "painted", "glows", "thin", "slabs", "splats")
+GLOWS = PAGE.parent / "images" / "subsurface_glows.png"
 MAP = 256  # pixels of a side of painted maps
 
 
@@ -37,6 +39,9 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     for name in options.parts:
+        if name == "glows":
+            glows()
+            continue
         made = {
             "cost": costs,
             "painted": lambda: painted(options.pictures),
@@ -177,6 +182,43 @@ def _wick(u, v):
     return np.where(np.hypot(u - 0.25, v - 0.25) < 0.05, 0.0, 1.0)
 
 
+def _place_as(scene: Callable[[str], None], shown) -> None:
+    """Places a scene of subsurface.py with `shown` as the material of its only mesh."""
+    import bpy
+
+    scene("BURLEY")
+    next(one for one in bpy.data.objects if one.type == "MESH").data.materials[0] = shown
+
+
+def leaf(shown) -> None:
+    _place_as(subsurface.leaf, shown)
+
+
+def ears(shown) -> None:
+    _place_as(subsurface.ears, shown)
+
+
+def _between_veins(u, v):
+    """White between the veins of a leaf, black along them."""
+    along, across = u, np.abs(v - 0.5)
+    middle = across < 0.02
+    side = np.abs((along - 0.7 * across) * 8 % 1.0 - 0.5) < 0.08
+    return np.where(middle | side, 0.0, 1.0)
+
+
+def _ears_alone(u, v):
+    """White about where Suzanne's ears lie in her UV map, black elsewhere."""
+    import bpy
+
+    mesh = next(one for one in bpy.data.objects if one.type == "MESH").data
+    places = [
+        mesh.uv_layers.active.uv[loop.index].vector
+        for loop in mesh.loops if abs(mesh.vertices[loop.vertex_index].co.x) > 0.85
+    ]  # fmt: skip
+    near = np.min([np.hypot(u - x, v - y) for x, y in {tuple(place) for place in places}], axis=0)
+    return np.clip(2.0 - near / 0.02, 0.0, 1.0)
+
+
 def _painted_cases() -> dict:
     """By label: values of the material, what places its body, and the maps that are painted, by name."""
     skin = (*subsurface.SKIN, 0.25)
@@ -187,6 +229,8 @@ def _painted_cases() -> dict:
         ),
         "veins": (skin, head, {"tint_map": _veins}),
         "candle, opaque wick": ((*subsurface.WAX, 0.8), wick_candle, {"translucency_map": _wick}),
+        "leaf, opaque veins": ((*subsurface.LEAF, 0.3), leaf, {"translucency_map": _between_veins}),
+        "ears alone": ((*subsurface.SKIN, 1.0), ears, {"translucency_map": _ears_alone}),
     }  # fmt: skip
 
 
@@ -232,14 +276,34 @@ def painted(folder: Path | None) -> str:
     return markdown.table(rows)
 
 
+def glows() -> None:
+    """The picture of docs/subsurface.md: a leaf and ears lit from behind, each without its map and with it."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+
+    shown = []
+    for label in ("leaf, opaque veins", "ears alone"):
+        with_maps(label)
+        body = next(one for one in bpy.data.objects if one.type == "MESH").data.materials[0]
+        painted_map = body.candela.image_space_subsurface_translucency_map
+        for given in ({}, {"translucency_map": painted_map}):
+            _set(body, **given)
+            found = render_passes(bpy.context.scene, "CANDELA", 16, 1, size=(192, 192), bounces=1)
+            shown.append(found.images["combined"][..., :3])
+    _write(GLOWS, np.concatenate(shown, axis=1))
+
+
 def _keep(folder: Path, label: str, row: np.ndarray) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(folder / f"painted_{label.split(' (')[0].replace(' ', '_').replace(',', '')}.png", row)
+
+
+def _write(file: Path, row: np.ndarray) -> None:
     from addon.compare.png import png
 
-    folder.mkdir(parents=True, exist_ok=True)
     shades = (np.clip(row, 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)[::-1]
-    (folder / f"painted_{label.split(' (')[0].replace(' ', '_').replace(',', '')}.png").write_bytes(
-        png(np.ascontiguousarray(shades))
-    )
+    file.write_bytes(png(np.ascontiguousarray(shades)))
 
 
 # Thin parts -----------------------------------------------------------------------------------------------------------

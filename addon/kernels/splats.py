@@ -8,7 +8,7 @@ A record is four texels at the same place of four images, all vec4:
     value   what is spread over the footprint; its meaning is the fragment program's
 
 The caller's fragment program gets them as flat varyings `splat_centre`, `splat_first`, `splat_second`, `splat_value`
-and decides what a pixel takes. The kernel is Epanechnikov's over the ellipse, 2 (1 - q) / (pi |first| |second|) with
+and decides what a pixel takes. The kernel is the biweight over the ellipse, 3 (1 - q)^2 / (pi |first| |second|) with
 q = (x/|first|)^2 + (y/|second|)^2, which integrates to one (shaders/splat/footprint.glsl).
 
 | cost | per draw |

@@ -44,7 +44,7 @@ LEAST_SIDE, SIDE, MOST = 128, 384, 8
 COLUMNS, ROWS = 4, 2
 CELLS = COLUMNS * ROWS  # of an image of kept maps, which a pass over hits asks all
 EXTENT = 3.0  # of the map, beside the casters as the light sees them
-LEAST_TEXELS = 0.9
+LEAST_TEXELS = 1.04
 INTO_MAP = splats.splat_program(
     "photon into caustic map",
     "caustics/map.frag.glsl",

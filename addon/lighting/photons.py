@@ -10,7 +10,7 @@ it meets a surface that is no caster. There each photon stands for an ellipse, b
 (photon differentials on a grid, Kim, Ray Tracing Gems 2019):
 
     Sigma = k^2 / 2 * sum over neighbours (x' - x)(x' - x)^T  +  (blur^2 + least^2) I
-    E(x)  = Phi * 2 max(0, 1 - q) / (pi sqrt(det Sigma)),   q = x^T Sigma^-1 x
+    E(x)  = Phi * 3 max(0, 1 - q)^2 / (pi sqrt(det Sigma)),   q = x^T Sigma^-1 x
 
 All photons of a sample share the point of the light, the numbers that a rough lobe draws from, and those that choose
 between mirrored and bent at later interfaces (in proportion to Fresnel's reflectance, and shared out evenly over the
@@ -111,8 +111,9 @@ FOOTPRINTS = passes.fullscreen_program(
     constants=(("FLOAT", "widening"), ("FLOAT", "least_pixels"), ("FLOAT", "longest")),
     outputs=(("VEC4", "out_centre"), ("VEC4", "out_first"), ("VEC4", "out_second"), ("VEC4", "out_value")),
 )
-WIDENING = 1.25  # of footprints beside the way to the neighbours: the least that leaves no gaps (docs/caustics.md)
-FALL_KNOWN, FALL_GROWING = -1.0 / 5.0, -1.0 / 5.0  # exponents of the footprints' fall with samples
+# Of footprints beside the way to the neighbours, and the exponent of their fall with samples. A grid's longest waves
+# have amplitudes of 48 J3(q) / q^3, q = 2 pi times the widening. The first zero of J3 has none: few samples have that.
+WIDENING, FALL, WIDENING_FEW = 1.443, -1.0 / 5.0, 1.0154
 FEW = 16  # samples of a light, below which each has several of its points
 FEW_LOBES = 64  # and below which each has all lobes of a material: one of three colours too often is a tint
 VIEWS = 4  # of lights and casters in a sample, in the mean, where lights may take turns
@@ -194,6 +195,11 @@ def lattice(k: int, count: int) -> float:
     golden section."""
     step = next(one for one in range(round(0.618034 * count), 0, -1) if gcd(one, count) == 1) if count > 1 else 1
     return k * step % count / count
+
+
+def widening(count: int) -> float:
+    """Half axes of footprints, in ways to a photon's neighbours, where `count` samples share the light."""
+    return WIDENING if count <= 1 else min(WIDENING_FEW, WIDENING * count**FALL)
 
 
 def balanced(light: LitView, moved: float) -> tuple[np.ndarray, float]:
@@ -419,7 +425,6 @@ class Photons:
         self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, least_pixels: float
     ) -> tuple[images.Image, ...]:
         """Records of kernels/splats.py for a bundle, at least `least_pixels` pixels of the view `onto` wide."""
-        fall = FALL_KNOWN if frame.settings.schedule.known_total else FALL_GROWING
         target = self._target("_footprints", bundle.side, 4)
         passes.fullscreen(
             FOOTPRINTS,
@@ -427,8 +432,7 @@ class Photons:
             textures=dict(zip(FOUND, bundle.found)),
             blocks={"film_view": onto},
             constants={
-                "widening": WIDENING * float(max(bundle.count, 1)) ** fall, "least_pixels": least_pixels,
-                "longest": LONGEST,
+                "widening": widening(bundle.count), "least_pixels": least_pixels, "longest": LONGEST,
             },
         )  # fmt: skip
         frame.count(technique, "passes")

@@ -72,7 +72,7 @@ def splat_program(gloss: bool) -> Program:
 
 DECLARED = splat_program(False), splat_program(True)
 LIGHT, GLOSS = "radiance.diffuse_indirect", "radiance.glossy_indirect"
-LEAST_PIXELS = 0.8
+LEAST_PIXELS = 0.92
 MAPS_APART = 4  # samples for which rays ask the same map: it costs as much as the picture's photons, and shows less
 INTERFACES = Param(
     "interfaces", "Interfaces", 16,

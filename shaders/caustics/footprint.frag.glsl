@@ -56,8 +56,8 @@ void main()
   ellipse += vec3(1.0, 0.0, 1.0) * (0.5 * alone * flux.w * flux.w);
   ellipse *= widening * widening;
   float pixel = view_pixel() * view_growth_ahead(point.xyz);
-  // Epanechnikov's kernel of radius h has the variance h^2 / 6, a disc of radius r r^2 / 4.
-  float least = least_pixels * least_pixels * pixel * pixel + 1.5 * facing.w * facing.w;
+  // The biweight kernel of radius h has the variance h^2 / 8, a disc of radius r r^2 / 4.
+  float least = least_pixels * least_pixels * pixel * pixel + 2.0 * facing.w * facing.w;
   ellipse += vec3(least, 0.0, least);
 
   // Half axes: the roots of the ellipse's eigenvalues along its eigenvectors.

@@ -11,7 +11,7 @@ from addon.snapshot.scene import Camera, Film
 
 
 def test_a_footprint_has_the_variance_of_the_disc_that_it_stands_for(gpu_context):
-    """Epanechnikov's kernel of radius h has the variance h^2 / 6 along an axis, an even disc of radius r r^2 / 4."""
+    """The biweight kernel of radius h has the variance h^2 / 8 along an axis, an even disc of radius r r^2 / 4."""
     disc = 0.3
     view = View(
         Camera(np.eye(4), "PERSPECTIVE", (-0.5, 0.5, -0.5, 0.5), 0.1, 100.0), Film(8, 8, (0, 0, 8, 8)), np.zeros(3)
@@ -29,4 +29,4 @@ def test_a_footprint_has_the_variance_of_the_disc_that_it_stands_for(gpu_context
     )  # fmt: skip
     first, second = (images.read(target.colors[k])[0, 0, :3] for k in (1, 2))
     radii = np.linalg.norm([first, second], axis=1)
-    assert radii**2 / 6 == pytest.approx(disc**2 / 4, rel=1e-4)
+    assert radii**2 / 8 == pytest.approx(disc**2 / 4, rel=1e-4)

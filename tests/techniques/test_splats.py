@@ -7,6 +7,7 @@ from addon.gfx import images
 from addon.gfx.struct import Block
 from addon.kernels import splats
 from addon.lighting.light_views import groups, views_of
+from addon.lighting.photons import widening
 from addon.scene.view import VIEW
 from addon.sources import lights
 from addon.techniques.caustics_mapping import INTO_MAP
@@ -59,6 +60,16 @@ def test_all_of_a_value_arrives(gpu_context, axes):
     drawn = images.read(target.colors[0])
     images.pool.give(target.colors[0])
     assert drawn[..., :3].sum(axis=(0, 1)) * area == pytest.approx([2.0, 1.0, 0.5], rel=0.01)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_footprints_of_photons_on_an_even_grid_leave_little_of_its_pattern(count):
+    """Biweight kernels one apart, in the measure of their half axes, about places between them."""
+    places = (np.arange(16) + 0.5) / 16
+    ways = (places[:, None] - np.arange(-3, 5)) ** 2
+    inside = np.maximum(1.0 - (ways[:, None, :, None] + ways[None, :, None, :]) / widening(count) ** 2, 0.0)
+    light = (inside**2).sum(axis=(2, 3))
+    assert light.std() < 0.03 * light.mean()
 
 
 def test_boxes_that_overlap_or_are_too_many_are_joined():
