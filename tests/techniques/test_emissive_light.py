@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from addon.lighting.emissive_triangles import along_curve, compact
+from addon.materials.energy import pane_passing
 from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
@@ -67,14 +68,16 @@ def test_close_to_a_mesh_few_samples_have_no_blotches(floor, cuts):
 
 
 def test_rays_to_points_of_each_pixels_own_pass_glass(floor):
-    """A sheet of glass below the panel, whose light no caustics bring."""
+    """A single sheet of glass below the panel, whose light no caustics bring: what leaves the floor through the sheet,
+    t = (1 - F) / n2. With bounces the floor has 7.85 there, in Cycles 7.78 (9.98 without the sheet)."""
     panel(floor, z=0.25)
     sheet = floor.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0)
     floor.rectangle((-3, -3), (3, 3), 0.1, material=sheet).visible_camera = False
     found = floor.render(16, SIZE)["diffuse_direct"][12:20, 12:20, 0].mean() * np.pi
     assert "of each pixel's own" in str(floor.ledger.row("emissive_light").choices)
-    whole = model.irradiance(model.area((0, 0, 0.25), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi), np.zeros((1, 3)))[0]
-    assert 0.5 * whole < found < whole
+    source = model.area((0, 0, 0.25), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    whole = model.irradiance(source, receivers(1)).reshape(SIZE)[12:20, 12:20].mean()
+    assert found == pytest.approx(pane_passing(1.5)[1] / 1.5**2 * whole, rel=0.05)
 
 
 @pytest.mark.slow

@@ -258,8 +258,11 @@ def test_light_of_fog_that_few_surfaces_know_reaches_all_between_them(gpu_contex
     nothing = dict.fromkeys(("surface_tint", "surface_lobe", "surface_emission"), (0.0, 0.0, 0.0, 0.0))
     found = drawn(
         surfaces_program(False),
-        {**flat_surface(width, height), **nothing, "surface_diffuse": (*albedo, 0.0), "known_light": known},
-        (width, height), constants={"shown_pixel": shown, "stride": stride},
+        {
+            **flat_surface(width, height), **nothing, "surface_diffuse": (*albedo, 0.0), "known_light": known,
+            "energy_table": energy_texture(False),
+        },
+        (width, height), constants={"shown_pixel": shown, "stride": stride, "shaded_roughness": 0.5},
         blocks={"film_view": view_from_above(width, height)},
     )[10:-12, 10:-12, :3]  # fmt: skip
     y, x = np.mgrid[:height, :width][:, 10:-12, 10:-12]
@@ -326,7 +329,8 @@ def test_of_a_caustic_map_is_kept_what_lies_on_surfaces(gpu_context):
 def test_paths_leave_by_the_lobe_with_its_energy_and_never_far_too_bright(gpu_context):
     """What a point draws of light from all sides is, in the mean, its integral over directions, at every slant; and no
     direction weighs much more than the mean, of which the cosine's own density made hundreds at grazing views."""
-    before = """Reflection r; r.diffuse = vec3(0.1); r.through = 0.0; r.rough = 0.0; r.straight = vec3(0.6);
+    before = """Reflection r; r.diffuse = vec3(0.1); r.through = vec3(0.0); r.rough = 0.0;
+  r.straight = vec3(0.6);
   r.grazing = vec3(0.9); r.alpha = 0.25; float slant = 0.02 + 0.98 * k; vec3 normal = vec3(0.0, 0.6, 0.8);
   vec3 viewer = slant * normal + sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0);
   float sum = 0.0; float most = 0.0; float blunt = 0.0;
