@@ -547,7 +547,7 @@ def test_walks_in_a_white_body_under_an_even_world_lose_nothing(stage):
     sphere(stage, scattering(stage, "RANDOM_WALK", 0.3 * WALK, color=(1, 1, 1)), radius=1.0)
     stage.world((1, 1, 1))
     stage.camera_above(0.5, 5.0)
-    assert shown(stage.render(4, size=(24, 24))).mean() == pytest.approx(1.0, abs=0.03)
+    assert shown(stage.render(16, size=(24, 24))).mean() == pytest.approx(1.0, abs=0.03)
 
 
 def test_walks_light_a_ball_from_behind_as_in_cycles(stage):
