@@ -483,7 +483,7 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
   float ior = clamp(coat_ior, 1.0, MOST_IOR);
   float mu = view_cosine(point, n);
   vec3 whole = weight * coat_weight;
-  bool grey = largest(abs(whole - vec3(whole.x))) < 2e-3 * whole.x;
+  bool grey = is_finite(whole.x) && largest(abs(whole - vec3(whole.x))) < 2e-3 * whole.x;
   vec3 albedo;
   if (COAT_APART && grey && closures.coat.x <= 0.0 && coat_is_thin(clamp(coat_roughness, 0.0, 1.0), ior)) {
     float roughness = clamp(coat_roughness, 0.0, 1.0);
