@@ -1,5 +1,5 @@
 // Strands of hair that are thinner than a pixel. All pixels look at the same place of their filters in a sample, so that
-// strands thinner than two thirds of a pixel, in step with the grid, would be met by all samples of a row or by none. They are drawn so wide
+// thin ones in step with the grid would be met by all samples of a row or by none. Those below WIDENED are drawn so wide
 // instead that each row of pixels (each column, of strands that lie flat) meets them once, and a fragment is kept with the
 // share of that width that the strand has (surface.frag.glsl): what is seen of it is the same in the mean.
 // `envelope` of its vertices: radius in local metres; minus (sides x steps + x) x steps + y, with x and y the strand's
@@ -8,7 +8,7 @@
 #include "lib/view.glsl"
 
 #define AXIS_STEPS 1024
-#define WIDENED 0.66  // of a pixel: thicker strands are met as they are, and shaded where they are seen
+#define WIDENED 0.7  // of a pixel: thicker strands are met as they are, and shaded where they are seen
 
 vec3 strand_axis(int code)
 {
