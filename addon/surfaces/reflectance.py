@@ -54,16 +54,17 @@ class Reflectance:
     def __init__(self):
         self._keys: dict[int, object] = {}  # by material: of what its cell shows
         self.image: images.Image | None = None
-        self.mirrors_box = np.zeros(
-            (2, 3)
-        )  # low and high corner around all that mirrors, relative to the scene's origin
+        self.mirrors_box = np.zeros((2, 3))  # corners around all that mirrors, relative to the scene's origin
+        self._boxed: tuple | None = None  # the snapshot and the origin that the box is of
 
     def update(self, frame: Frame) -> None:
         """Draw anew the materials that have changed or whose surfaces have."""
         self._update(frame)
         owned = MIRRORS_OWNED if frame.plan.owns(LIGHT_SPECULAR_DIFFUSE) else ()
         mirrors = MIRRORS if any(smooth_metal(frame, k) for k in frame.snapshot.used_materials) else ()
-        self.mirrors_box = _mirrors_box(frame)
+        boxed = frame.snapshot, tuple(frame.geometry.origin)
+        if self._boxed is None or self._boxed[0] is not boxed[0] or self._boxed[1] != boxed[1]:
+            self._boxed, self.mirrors_box = boxed, _mirrors_box(frame)  # techniques ask in every sample
         dropped = () if frame.snapshot.film.caustics_reflective else MIRRORS_DROPPED
         turned = TURNED if _turns_normals(frame) else ()
         self.image.defines = (*owned, *mirrors, *dropped, *turned)
