@@ -331,8 +331,10 @@ class Viewport:
 
     def _climbs(self, camera: Camera, size, border, settings: Settings, clock) -> bool:
         """Begin the same picture in finer pixels, if it rests; whether it does."""
-        if self._beginning is not None or not self.frame.samples_done or self._sample is not None:
+        if self._beginning is not None or not self.frame.samples_done:
             return False
+        if self._sample is not None and self.frame.samples_done < settings.samples:
+            return False  # a sample that was begun is drawn first, unless fewer are asked now
         rests = clock() - self._changed_at > max(REST_S, 2.0 * min(self._pauses))
         finer = self.pace.finer(self.scale) if self.scale > 1 else 1
         if self.direct and (finer == 1 or not rests):

@@ -10,6 +10,7 @@ from mathutils import Vector
 from addon import viewport
 from addon.frame.bands import Bands
 from addon.gfx import images, passes
+from addon.viewport import picture
 from addon.viewport.pace import GuidePace
 from addon.viewport.picture import Viewport
 from tests.viewport.region import SIZE
@@ -162,6 +163,27 @@ def test_view_that_is_redrawn_seldom_does_not_rest_between_two_changes(region):
         region.draw()
         region.clock.now += 1.5 * viewport.REST_S
     assert region.viewport.scale == 1
+
+
+def test_view_gets_finer_when_fewer_samples_are_asked_within_one_of_a_draft(region, monkeypatch):
+    """Which is not drawn to its end then."""
+    region.rest()
+    bpy.context.scene.candela.viewport_samples = 64
+    region.camera = region.moved(0.1)
+    region.clock.tick = viewport.BUDGET_S / 8
+    for _ in range(200):
+        region.viewport.pace.cost = {16: 0.1, 8: 0.4, 4: 1.0, 2: 3.0, 1: 9.0}
+        region.draw()
+        if region.viewport.scale == 4:
+            monkeypatch.setattr(picture, "REST_S", np.inf)
+            if region.viewport.frame.samples_done > 2 and region.viewport._sample is not None:
+                break
+    monkeypatch.undo()
+    assert region.viewport.scale == 4 and region.viewport._sample is not None
+    region.clock.tick = 0.0
+    bpy.context.scene.candela.viewport_samples = 2
+    region.rest()
+    assert region.viewport.scale == 1 and region.viewport.frame.settings.samples == 2
 
 
 @pytest.mark.parametrize(("height", "scale"), [(2000, 16), (1024, 16), (1000, 8), (300, 4), (100, 1), (20, 1)])
