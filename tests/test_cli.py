@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.cli.files import refuse_others
+from addon.cli.files import refuse_blend, refuse_others
 from addon.cli.refused import Refused
 from addon.cli.slices import read_header
 from addon.cli.terminal import quiet
@@ -344,6 +344,16 @@ def test_a_page_of_an_earlier_version_is_replaced_and_one_that_only_speaks_of_it
     (tmp_path / "cycles.png").write_bytes(b"")
     with nullcontext() if is_ours else pytest.raises(Refused, match=r"index\.html .* not replaced"):
         refuse_others(tmp_path, {"index.html": MADE_BY}, ("candela.png", "cycles.png"))
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo], ids=["folder", "pipe"])
+def test_what_is_no_file_is_neither_replaced_nor_waited_for(make, tmp_path):
+    make(tmp_path / "index.html")
+    with pytest.raises(Refused, match=r"index\.html .* not replaced"):
+        refuse_others(tmp_path, {"index.html": MADE_BY})
+    make(tmp_path / "scene.blend")
+    with pytest.raises(Refused, match=r"not a \.blend file"):
+        refuse_blend(tmp_path / "scene.blend")
 
 
 def test_merge_opens_no_file_that_a_slice_names(tmp_path):

@@ -15,6 +15,7 @@ from pathlib import Path
 from .refused import Refused, reason
 
 WRITING = ".writing_"  # how the names of folders begin whose files are not in place yet
+BOOT = Path("/proc/sys/kernel/random/boot_id")
 MOST_MARKED = 1 << 16  # letters of a file in which its mark stands
 BLEND_STARTS = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # plain, compressed by zstd, by gzip (before 3.0)
 
@@ -24,6 +25,8 @@ def refuse_blend(path: Path) -> None:
     try:
         if path.is_dir():
             raise Refused(f"{path} is a folder, not a .blend file.")
+        if path.exists() and not path.is_file():  # to open a pipe would wait
+            raise Refused(f"{path} is not a .blend file.")
         with path.open("rb") as file:
             start = file.read(max(map(len, BLEND_STARTS)))
     except FileNotFoundError:
@@ -60,12 +63,14 @@ def refuse_others(folder: Path, marks: dict[str, tuple[tuple[str, ...], ...]], b
     which Candela writes (a mark is there where all of its strings are); of the names `beside`, which bear no mark,
     where none of the marked ones stands."""
     for name, known in marks.items():
-        with contextlib.suppress(FileNotFoundError):
-            with (folder / name).open(encoding="utf-8", errors="replace") as file:
+        place, text = folder / name, ""
+        if not place.exists():
+            continue
+        if place.is_file():  # to open a pipe would wait
+            with place.open(encoding="utf-8", errors="replace") as file:
                 text = file.read(MOST_MARKED)
-            is_own = any(all(part in text for part in mark) for mark in known)
-            if not is_own:
-                raise Refused(f"{folder / name} was not written by Candela and is not replaced; choose another folder.")
+        if not any(all(part in text for part in mark) for mark in known):
+            raise Refused(f"{place} was not written by Candela and is not replaced; choose another folder.")
     for name in beside:
         if (folder / name).exists() and not any((folder / one).exists() for one in marks):
             raise Refused(f"{folder / name} was there before and is not replaced; choose another folder.")
@@ -100,12 +105,12 @@ def _lives(pid: int) -> bool:
 
 @functools.cache
 def _machine() -> str:
-    """Of all processes whose numbers mean the same: this machine, or this container of it."""
-    try:
-        space = str(Path("/proc/self/ns/pid").readlink())
-    except OSError:
-        space = ""
-    return hashlib.blake2b(f"{platform.node()} {space}".encode(), digest_size=4).hexdigest()
+    """Of all processes whose numbers mean the same: this machine since it was started, or this container of it.
+    Machines of a farm may share their name, and all have the same first space of numbers."""
+    told = [platform.node()]
+    with contextlib.suppress(OSError):
+        told += [str(Path("/proc/self/ns/pid").readlink()), BOOT.read_text(encoding="ascii")]
+    return hashlib.blake2b(" ".join(told).encode(), digest_size=4).hexdigest()
 
 
 @contextlib.contextmanager

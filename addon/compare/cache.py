@@ -16,6 +16,7 @@ import stat
 import tempfile
 import time
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +29,11 @@ FOLDER = "candela_references"  # below the folder that is named
 MARK = "candela_"  # how names of entries begin
 WRITING = ".writing_candela_"  # how names of entries begin that some process is writing
 ABANDONED_S = 24 * 3600.0  # an entry that is being written for so long belongs to a process that was ended
+# What reading a damaged zip of arrays raises, from its table, its packed bytes, or the head of an array.
+DAMAGED = (
+    zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, MemoryError,
+    OSError, TypeError,
+)  # fmt: skip
 HALF_MAX = 65504.0  # largest float16: the half difference is kept in 16 bits, it only measures noise
 
 
@@ -88,13 +94,14 @@ def load(folder: Path, key: str) -> Reference | None:
             about = json.loads(str(file["about"]))
             images = {name[6:]: file[name] for name in file.files if name.startswith("image/")}
             half = {name[5:]: file[name].astype(np.float32) for name in file.files if name.startswith("half/")}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        made = Reference(images, half, about["samples"], about["seconds"], about["film_transparent"], True, key)
+    except DAMAGED:
         return None
     if "combined" not in images or images.keys() != half.keys():
         return None
     with contextlib.suppress(OSError):
         os.utime(path)  # used now: the oldest go first when room is made
-    return Reference(images, half, about["samples"], about["seconds"], about["film_transparent"], True, key)
+    return made
 
 
 def save(folder: Path, reference: Reference) -> None:

@@ -7,9 +7,10 @@ anything of it is used: sizes first, then shapes, ranges and finite numbers.
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
+import os
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -213,25 +214,32 @@ def save(patch: Patch, path: Path) -> None:
 
 def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """A zip of arrays that is there whole or not at all. Raises PatchError."""
-    unfinished = path.with_name(path.name + ".unfinished")
+    unfinished = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
+        handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=".writing_candela_")
+        with (
+            os.fdopen(handle, "wb") as file,
+            zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed,
+        ):
             for name, array in arrays.items():
                 content = io.BytesIO()
                 np.lib.format.write_array(content, np.ascontiguousarray(array), allow_pickle=False)
                 entry = zipfile.ZipInfo(f"{name}.npy")  # of 1980: equal patches are equal files
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 packed.writestr(entry, content.getvalue())
-        unfinished.replace(path)
+        Path(unfinished).chmod(0o644)  # mkstemp lets only the owner read
+        Path(unfinished).replace(path)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
+        if unfinished:
+            Path(unfinished).unlink(missing_ok=True)
         raise PatchError(f"{path} could not be written: {error.strerror or error}.") from error
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """The arrays of such a zip. Raises PatchError."""
+    if path.exists() and not path.is_file():  # to open a pipe would wait
+        raise PatchError(f"{path} is no file.")
     try:
         with zipfile.ZipFile(path) as packed:
             if sum(entry.file_size for entry in packed.infolist()) > MOST_BYTES:

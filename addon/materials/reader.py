@@ -7,6 +7,7 @@ treated as if nothing were linked. Node settings are read generically, so that a
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -402,10 +403,11 @@ def _profile(node) -> Profile:
     if node.mode == "INTERNAL":
         return Profile(node.ies.as_string() if node.ies is not None else "")
     path = Path(bpy.path.abspath(node.filepath, library=node.id_data.library))
-    try:
-        return Profile(path.read_bytes()[:MOST_OF_PROFILE].decode("latin-1"))
-    except (OSError, ValueError):
-        return Profile("")
+    with contextlib.suppress(OSError, ValueError):
+        if path.is_file():  # to open a pipe would wait
+            with path.open("rb") as file:
+                return Profile(file.read(MOST_OF_PROFILE).decode("latin-1"))
+    return Profile("")
 
 
 def _pass_through(conversions: list[str], kind: str) -> None:

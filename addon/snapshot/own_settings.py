@@ -6,6 +6,7 @@ whatever has been set, by the property's identifier; what was never touched has 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -29,10 +30,11 @@ def all_settings(block) -> Own:
 
 
 def _content(path: str) -> str:
-    try:
-        return hashlib.blake2b(Path(path).read_bytes(), digest_size=20).hexdigest()
-    except OSError:  # the ledger says what is missing
-        return ""
+    with contextlib.suppress(OSError, ValueError):  # the ledger says what is missing
+        if Path(path).is_file():  # to open a pipe would wait
+            with Path(path).open("rb") as file:
+                return hashlib.file_digest(file, "blake2b").hexdigest()
+    return ""
 
 
 def own_images(block) -> Iterator[tuple[str, bpy.types.Image]]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from addon.cli import files
 from addon.snapshot.exr import read_exr
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -215,6 +216,22 @@ def test_what_a_killed_process_was_writing_goes_with_the_next(moving, tmp_path):
     done = candela("render", moving, "--size", "16x12", "--samples", "1", "--output", "out/a.png", folder=tmp_path)
     assert done.returncode == 0
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.png"]
+
+
+def test_what_another_machine_of_the_same_name_is_writing_stays(tmp_path, monkeypatch):
+    """Machines copied from one image have one name, and the first space of process numbers has one number on all."""
+    monkeypatch.setattr(files, "_lives", lambda pid: False)
+    place = tmp_path / f"{files.WRITING}{files._machine()}_4711_abc"
+    place.mkdir()
+    (tmp_path / "boot").write_text("another")
+    with monkeypatch.context() as there:
+        there.setattr(files, "BOOT", tmp_path / "boot")
+        files._machine.cache_clear()
+        files.clear_abandoned(tmp_path)
+    files._machine.cache_clear()
+    assert place.exists()
+    files.clear_abandoned(tmp_path)
+    assert not place.exists()
 
 
 # -------------------------------------------------------------------------------------------------------------- bundles

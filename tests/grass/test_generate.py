@@ -223,7 +223,16 @@ def test_a_full_disk_is_a_sentence(tiny, tmp_path, monkeypatch):
     monkeypatch.setattr(zipfile.ZipFile, "writestr", full)
     with pytest.raises(patch.PatchError, match=r"view_0000.npz could not be written: No space left on device\.$"):
         run(TINY, tmp_path / "tiny.grass")
-    assert not list(tmp_path.rglob("*.unfinished"))
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_link_of_the_name_that_patches_once_had_meanwhile_is_not_written_through(tiny, tmp_path):
+    """What is not finished has a name that nobody can foresee."""
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "tiny.grass.unfinished").symlink_to(tmp_path / "mine")
+    made = patch.load(tiny)
+    patch.save(made, tmp_path / "tiny.grass")
+    assert (tmp_path / "mine").read_text() == "mine" and patch.load(tmp_path / "tiny.grass").views == made.views
 
 
 @pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04 cut off"])

@@ -6,19 +6,24 @@ CANDELA_FUZZ=2000 tries that many of each kind; CANDELA_FUZZ_SEED=N others than 
 import json
 import os
 import struct
+import threading
 import time
 import tracemalloc
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from addon.cli.refused import Refused
 from addon.cli.slices import read_header, read_sums
+from addon.compare import cache
 from addon.compare.exr_write import read_about, write_exr
 from addon.gfx import device
+from addon.grass import patch
 from addon.materials import ies
-from addon.snapshot import vdb_header
+from addon.materials.reader import _profile
+from addon.snapshot import own_settings, vdb_header
 from addon.snapshot.exr import ExrError, read_exr
 from addon.snapshot.scene import one_line
 from addon.snapshot.volumes import openvdb
@@ -125,6 +130,53 @@ def test_headers_of_damaged_volumes_are_refused_or_hold_what_they_name(tmp_path)
     for data in damaged(path.read_bytes(), COUNT):
         path.write_bytes(data)
         bounded(read)
+
+
+def test_damaged_references_are_as_none(tmp_path):
+    """Their pictures are packed: what unpacks to nothing is no reference, and is rendered again."""
+    pixels = {"combined": np.random.default_rng(1).random((20, 20, 4)).astype(np.float32)}
+    cache.save(tmp_path, cache.Reference(pixels, pixels, 4, 1.0, key="a"))
+    path = cache.entry(tmp_path, "a")
+
+    def read():
+        found = cache.load(tmp_path, "a")
+        assert found is None or found.images["combined"].ndim
+
+    for data in damaged(path.read_bytes(), COUNT):
+        path.write_bytes(data)
+        bounded(read)
+
+
+def a_profile(path):
+    node = SimpleNamespace(mode="EXTERNAL", filepath=str(path), id_data=SimpleNamespace(library=None))
+    return _profile(node).text
+
+
+def a_patch(path):
+    with pytest.raises(patch.PatchError):
+        patch.load(path)
+
+
+READERS = [a_profile, lambda path: own_settings._content(str(path)), a_patch]
+
+
+@pytest.mark.parametrize("read", READERS, ids=["light profile", "content of a setting", "grass"])
+def test_what_a_file_names_and_is_no_file_is_not_waited_for(read, tmp_path):
+    """A pipe that nobody writes to."""
+    os.mkfifo(tmp_path / "pipe")
+    work = threading.Thread(target=read, args=(tmp_path / "pipe",), daemon=True)
+    work.start()
+    work.join(5.0)
+    if waits := work.is_alive():
+        os.close(os.open(tmp_path / "pipe", os.O_WRONLY))
+    assert not waits
+
+
+@pytest.mark.parametrize("read", READERS[::2], ids=["light profile", "grass"])
+def test_of_a_file_of_terabytes_no_more_is_read_than_such_a_file_may_have(read, tmp_path):
+    with (tmp_path / "huge").open("wb") as file:
+        file.truncate(1 << 40)  # takes no room on the disk
+    bounded(lambda: read(tmp_path / "huge"))
 
 
 def test_damaged_light_profiles_are_read_or_said_to_be_unreadable():
