@@ -4,8 +4,7 @@ Each number makes one scene: objects of several kinds under modifiers, Principle
 and mixes, lamps of all kinds and shapes, a world, a camera; in metres, hundredths or hundreds of them. Both engines
 render it without bounces, or with all light, and what differs by more than noise is printed with what the scene holds.
 `--save` writes a scene to a file instead, to be taken apart. `--alone SECONDS` renders as many as fit in that time by
-Candela alone, and tells of pixels that are not finite, of errors, and what memory the process held meanwhile, and what
-of it is kept by name; with `--same` the first scene again and again, which tells what stays of a picture.
+Candela alone (bench/long_runs.py).
 """
 
 from __future__ import annotations
@@ -13,16 +12,14 @@ from __future__ import annotations
 import argparse
 import math
 import random
-import resource
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import bpy
 import mathutils
 import numpy as np
 
+from bench import long_runs
 from bench.quick import size_of
 from bench.shading import tree_of
 
@@ -60,18 +57,24 @@ class Draws:
 
     number: int
     notes: list[str] = field(default_factory=list)
+    alike: int = 1  # scenes in a row that hold things of the same kinds
 
     def __post_init__(self):
-        self.draw = random.Random(self.number)
+        self.draw = self.kinds = random.Random(self.number)
+
+    def about(self, thing: str) -> None:
+        """What kinds of it there are is drawn next: alike for scenes that are."""
+        if self.alike > 1:
+            self.kinds = random.Random(f"{self.number // self.alike} {thing}")
 
     def happens(self, chance: float, note: str = "") -> bool:
-        drawn = self.draw.random() < chance
+        drawn = self.kinds.random() < chance
         if drawn and note:
             self.notes.append(note)
         return drawn
 
     def choice(self, of, note: bool = True):
-        drawn = self.draw.choice(list(of))
+        drawn = self.kinds.choice(list(of))
         if note:
             self.notes.append(str(drawn))
         return drawn
@@ -81,10 +84,10 @@ class Draws:
 
 
 def build(number: int, alike: int = 1) -> tuple[bpy.types.Scene, str]:
-    """Scene `number` in an empty file, and what it holds. `alike` scenes in a row share their materials, whose programs
-    are then compiled once for all of them."""
+    """Scene `number` in an empty file, and what it holds. `alike` scenes in a row share their materials, and kinds of
+    lamps, world and camera, whose programs are then compiled once for all of them."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene, draws = bpy.context.scene, Draws(number)
+    scene, draws = bpy.context.scene, Draws(number, alike=alike)
     unit = draws.draw.choice(UNITS)
     draws.notes.append(f"{unit:g} m")
     painted = draws if alike == 1 else Draws(number // alike, draws.notes)
@@ -93,9 +96,12 @@ def build(number: int, alike: int = 1) -> tuple[bpy.types.Scene, str]:
     bpy.context.object.data.materials.append(materials[0])
     for _ in range(draws.draw.randint(2, 6)):
         _object(draws, unit, materials)
-    for _ in range(draws.draw.randint(1, 4)):
+    for k in range(draws.draw.randint(1, 4)):
+        draws.about(f"lamp {k}")
         _lamp(draws, unit, scene)
+    draws.about("world")
     _world(draws, scene)
+    draws.about("camera")
     _camera(draws, unit, scene)
     scene.view_settings.view_transform = "Standard"
     return scene, ", ".join(draws.notes)
@@ -302,55 +308,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tolerance", type=float, default=0.01, metavar="E", help="relMSE that is off (default 0.01)")
     parser.add_argument("--alone", type=float, metavar="SECONDS", help="as many as fit, by Candela alone, with bounces")
     parser.add_argument(
-        "--alike", type=int, default=1, metavar="N", help="of those, N in a row share their materials (default 1)"
+        "--alike", type=int, default=1, metavar="N", help="of those, N in a row are of the same kinds (default 1)"
     )
     parser.add_argument("--same", action="store_true", help="with --alone: the first scene again and again")
+    parser.add_argument("--keep", action="store_true", help="with --alone: go on after the last scene that is kept")
     parser.add_argument("--every", type=int, default=25, metavar="N", help="scenes between two looks at memory (25)")
     parser.add_argument("--save", metavar="FILE.blend", help="write the first scene to a file and render nothing")
-
-
-def alone(options: argparse.Namespace) -> int:
-    """Render scenes for so many seconds; 1 if one of them failed or had pixels that are not finite."""
-    from addon.compare.reference import render_passes
-    from addon.frame import ledger
-    from bench.memory import kept
-
-    first, size, samples, every = options.first, options.size, min(options.samples, 4), options.every
-    wrong, held, done, until = [], [], 0, time.monotonic() + options.alone
-    while time.monotonic() < until:
-        number = first if options.same else first + done
-        scene, notes = build(number, options.alike)
-        try:
-            render_passes(scene, "CANDELA", 1 + number % samples, number, size=size)
-            bad = ledger.latest().bad_pixels
-        except Exception as error:
-            bad = f"{type(error).__name__}: {error}"
-        if bad:
-            wrong.append(number)
-            print(
-                f"{number}: {bad if isinstance(bad, str) else f'{bad} pixels are not finite'}\n    {notes}", flush=True
-            )
-        done += 1
-        if done % every == 0:
-            held.append(resident())
-            said = ", ".join(
-                f"{value >> 20} MiB of {name}" if name in ("pool", "images") else f"{value} {name}"
-                for name, value in kept().items()
-            )
-            print(f"{done} scenes, {held[-1]} MiB; {said}", flush=True)
-    spent = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-    print(f"{done} scenes, {len(wrong)} wrong: {wrong}; {spent:.0f} s of the processor")
-    if len(held) > 3:
-        print(f"{held[len(held) // 4]} MiB after a quarter of them, {max(held)} at most, {held[-1]} at the end")
-    return int(bool(wrong))
-
-
-def resident() -> int:
-    """MiB of memory that this process holds; of operating systems that do not tell, the most that it held."""
-    statm = Path("/proc/self/statm")
-    if statm.exists():
-        return int(statm.read_text().split()[1]) * resource.getpagesize() >> 20
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
 
 
 def command(options: argparse.Namespace) -> int:
@@ -364,8 +327,8 @@ def command(options: argparse.Namespace) -> int:
         bpy.ops.wm.save_as_mainfile(filepath=options.save)
         print(notes)
         return 0
-    if options.alone:
-        return alone(options)
+    if options.alone is not None:
+        return long_runs.alone(options)
     off = 0
     for number in range(options.first, options.first + options.count):
         scene, notes = build(number)

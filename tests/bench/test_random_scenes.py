@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench import random_scenes
+from bench import long_runs, random_scenes
 
 
 def test_a_number_makes_one_scene():
@@ -63,16 +63,57 @@ def test_worst_pixels_do_not_decide():
     assert not random_scenes.differences(own, picture(1.0), picture(1.0), 1e-6)[1]
 
 
-@pytest.mark.parametrize(("bad", "said"), [(0, "0 wrong"), (3, "3 pixels are not finite")])
-def test_scenes_by_candela_alone_are_counted_and_what_is_wrong_is_said(monkeypatch, capsys, bad, said):
+@pytest.fixture
+def rendered(monkeypatch, tmp_path):
+    """Numbers of the scenes that a command line of --alone would render, with so many bad pixels in each."""
     from addon.compare import reference
     from addon.frame import ledger
 
-    monkeypatch.setattr(reference, "render_passes", lambda *given, **options: None)
-    monkeypatch.setattr(ledger, "latest", lambda: SimpleNamespace(bad_pixels=bad))
-    parser = argparse.ArgumentParser()
-    random_scenes.add_options(parser)
-    options = parser.parse_args(["--alone", "0.2", "--size", "16x12", "--every", "1", "--same"])
-    assert random_scenes.alone(options) == int(bad > 0)
+    seeds = []
+    monkeypatch.setattr(long_runs, "KEPT", tmp_path)
+    monkeypatch.setattr(reference, "render_passes", lambda scene, engine, samples, seed, **options: seeds.append(seed))
+
+    def rendered(*arguments, bad=0):
+        monkeypatch.setattr(ledger, "latest", lambda: SimpleNamespace(bad_pixels=bad))
+        parser = argparse.ArgumentParser()
+        random_scenes.add_options(parser)
+        seeds.clear()
+        options = parser.parse_args(["--alone", "0.2", "--size", "16x12", "--every", "1", *arguments])
+        return list(seeds) if long_runs.alone(options) == int(bad > 0) else None
+
+    return rendered
+
+
+@pytest.mark.parametrize(("bad", "said"), [(0, "0 wrong"), (3, "3 pixels are not finite")])
+def test_scenes_by_candela_alone_are_counted_and_what_is_wrong_is_said(rendered, capsys, tmp_path, bad, said):
+    assert set(rendered("--same", bad=bad)) == {0}
     printed = capsys.readouterr().out
     assert said in printed and "1 scenes, " in printed and "MiB of images" in printed
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_is_kept_goes_on_where_the_last_one_ended_and_figures_add_up(rendered, capsys, tmp_path):
+    first = rendered("--keep", "--first", "7")
+    second = rendered("--keep", bad=1)
+    assert first[0] == 7 and first + second == list(range(7, 7 + len(first) + len(second)))
+    (place,) = tmp_path.iterdir()
+    runs = long_runs.read(place)
+    assert [one.count for one in runs] == [len(first), len(second)] and all(one.ended for one in runs)
+    assert [*runs[1].wrong] == [str(number) for number in second] and runs[0].resident[-1][0] == len(first)
+    capsys.readouterr()
+    assert rendered("--keep", "--alone", "0") == []
+    assert f"{len(first) + len(second)} scenes in 2 runs, {len(second)} wrong" in capsys.readouterr().out
+
+
+def test_a_run_whose_process_dies_is_told_apart_and_the_next_begins_with_its_scene(rendered, capsys, monkeypatch):
+    def dies(run, options):
+        if run.count == 2:
+            raise SystemExit
+        run.count += 1
+
+    with monkeypatch.context() as changed:
+        changed.setattr(long_runs, "_render", dies)
+        with pytest.raises(SystemExit):
+            rendered("--keep", "--alone", "60")
+    assert rendered("--keep")[0] == 2
+    assert "1 runs without an end, at [2]" in capsys.readouterr().out

@@ -102,6 +102,8 @@ def test_views_from_a_point_among_the_receivers_contain_all_of_them():
     corners = boxes.corners.reshape(-1, 3)
     assert contained(views, corners).all()
     assert len(views) <= 6
+    # A view tells directions apart: what it shows side by side and one above the other are two axes.
+    assert all(np.linalg.matrix_rank(view.rows[:3, :3]) == 3 for view in views)
 
 
 def within(boxes, count=64):

@@ -112,6 +112,15 @@ def test_triangles_without_area_are_dropped():
     assert len(edges.table(np.zeros((0, 3)), np.zeros((0, 3), int)).ends) == 0
 
 
+@pytest.mark.parametrize("closed", (True, False), ids=("closed", "open"))
+def test_a_record_says_which_way_each_triangle_runs_along_its_edge(closed):
+    """As shaders/edges/edge_record.glsl takes the code apart: none, where there is no second triangle."""
+    scene = soup(np.random.default_rng(4), closed=closed)
+    code = silhouettes.records_of(scene, np.arange(len(scene.ends)), np.zeros(len(scene.ends)))[:, 0, 3].astype(int)
+    np.testing.assert_array_equal(np.stack([code % 3, code // 3], axis=1) - 1, scene.orient)
+    assert (scene.orient != 0).all() == closed
+
+
 def test_weights_do_not_depend_on_winding():
     random = np.random.default_rng(3)
     points = random.normal(size=(4, 3))

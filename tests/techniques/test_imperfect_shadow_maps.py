@@ -1,11 +1,15 @@
 """Imperfect shadow maps: closed forms where nothing is hidden, traced visibility as the measure where something is."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.lighting.imperfect_maps import ImperfectMaps
+from addon.sources.rates import Rate
 from tests.techniques.test_caustics import ball, glass
 from tests.techniques.test_caustics_of_meshes_and_worlds import world_with_a_bright_zenith
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
@@ -272,3 +276,11 @@ def test_glass_whose_light_arrives_as_caustics_has_depth_maps_and_says_so(stage,
     assert direct_light(stage, "POINTS", 2, (12, 12), bounces=1).max() == pytest.approx(0.0, abs=1e-6)
     name = "accumulated_maps" if source == "lamp" else "environment_light"
     assert "as caustics" in str(ledger.latest().row(name).choices)
+
+
+@pytest.mark.parametrize("samples", [8, 16, 64, 256])
+def test_a_wide_light_has_as_many_points_in_a_picture_whatever_its_samples(samples):
+    """Where their number is known: 256 points, or one in each sample."""
+    schedule = SimpleNamespace(known_total=True, is_draft=False)
+    frame = SimpleNamespace(settings=SimpleNamespace(samples=samples, schedule=schedule))
+    assert samples * 2 ** ImperfectMaps().rate(frame, Rate(0)).exponent == 256

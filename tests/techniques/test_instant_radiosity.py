@@ -11,6 +11,7 @@ from addon.frame import ledger
 from addon.frame.schedule import AT_REST, DRAFT, FINAL
 from addon.frame.settings import Settings
 from addon.gfx import images
+from addon.lighting import probes
 from addon.sampling.sequence import point
 from addon.surfaces.reflectance import BANDS, COLUMNS, Reflectance
 from addon.techniques.instant_radiosity import DEEPER, InstantRadiosity, deeper_weight
@@ -443,3 +444,28 @@ def test_a_floor_whose_normals_are_turned_throws_the_light_that_it_reflects(stag
         image = stage.render(4, (16, 16), bounces=1)["diffuse_indirect"][..., 0]
         found.append(image[7:9, 7:9].mean())
     assert found[1] / found[0] == pytest.approx(turned[2] / np.linalg.norm(turned), rel=0.06)
+
+
+def test_probes_stand_on_the_surface_that_is_seen_one_in_each_cell(stage, render, monkeypatch):
+    """On a tilted floor that nothing else sees: nearly as many as the picture has room for, all in its plane, though
+    most stand between pixels, and no two at one place."""
+    found = []
+
+    def keep(frame, grid, bindings, find=probes.find):
+        made = find(frame, grid, bindings)
+        found.append((images.read(made["probe_places"])[0], grid[0] * grid[1]))
+        return made
+
+    monkeypatch.setattr(probes, "find", keep)
+    stage.floor(half=3.0, turn=(0.4, 0.3, 0.0))
+    stage.light("SUN", turn=(0.2, 0.1, 0.0))
+    stage.camera_above(2.0)
+    stage.scene.candela.slot_indirect = "instant_radiosity"
+    render(1, samples=4)
+    for places, room in found:
+        stand = places[places[:, 3] > 0, :3].astype(float)
+        assert 0.3 * room < len(stand) <= room
+        apart = stand - stand.mean(axis=0)
+        assert np.linalg.svd(apart, compute_uv=False)[-1] / len(stand) ** 0.5 < 1e-5
+        between = np.linalg.norm(stand[:, None] - stand, axis=2) + np.eye(len(stand))
+        assert between.min() > 1e-3

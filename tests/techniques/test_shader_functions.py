@@ -14,6 +14,7 @@ from addon.lighting.light_choice import Choice
 from addon.lighting.media_bounces import surfaces_program
 from addon.materials.energy import energy_texture
 from addon.scene.view import VIEW
+from addon.surfaces import hits
 from addon.surfaces.scatter_means import MEANS
 from addon.techniques.multires_radiosity import PULL
 from tests.glsl import evaluated
@@ -422,3 +423,27 @@ def test_candidates_are_ordered_within_the_bounds_of_those_that_are_there_and_co
     assert sorted(value for value in importance[:, 0] if value) == pytest.approx([0.5, 2.0, 3.0])
     np.testing.assert_array_equal(importance[:, 1], importance[:, 0] > 0)
     choice.release()
+
+
+def test_luminance_is_the_second_row_of_the_primaries_matrix(gpu_context):
+    """Of Rec. 709 with the white point D65."""
+    primaries = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])
+    columns = np.column_stack([primaries, 1 - primaries.sum(axis=1)]).T / primaries[:, 1]
+    exact = np.linalg.solve(columns, np.array([0.3127, 0.3290, 1 - 0.6417]) / 0.3290)
+    channels = ", ".join(f"luminance(vec3({c}))" for c in ("1.0, 0.0, 0.0", "0.0, 1.0, 0.0", "0.0, 0.0, 1.0", "1.0"))
+    found = evaluated("lib/math.glsl", f"vec4({channels})", 2)[0]
+    np.testing.assert_allclose(found, [*exact, 1.0], atol=1e-4)
+
+
+def test_records_of_a_material_are_marked_by_who_leads_its_program(gpu_context):
+    """Who leads, and where values begin, come out of one float; with the first goes the depth of the mask."""
+    leader, base = np.array([0, 1, 255, 256, 8000, 8191]), np.array([0, 3, 511, 17, 1000, 1023])
+    packed = np.zeros((1, 256, 4))
+    packed[0, : len(leader), 3] = leader + (base << hits.LEADER_BITS)
+    found = evaluated(
+        "hits/shared.glsl", "vec4(shared_leader(m), shared_base(m), shared_depth(m), 0.0)", len(leader),
+        before="int m = int(gl_FragCoord.x);", bound={"hit_materials": images.upload(packed)},
+        textures=(("RGBA32F", "hit_materials"),),
+    )  # fmt: skip
+    np.testing.assert_array_equal(found[:, :2], np.stack([leader, base], axis=1))
+    np.testing.assert_array_equal(found[:, 2], [np.float32(hits.depth_of(int(k))) for k in leader])

@@ -1,11 +1,15 @@
 """Which candidates become virtual lights: without bias, spread in space, and alike in pictures that are alike."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.gfx import images
 from addon.kernels import ordered_lists
+from addon.lighting import virtual_lights
 from addon.lighting.light_choice import CELL, Choice
+from addon.sources import lights
 
 COUNT = 512
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -114,3 +118,32 @@ def test_candidates_in_one_place_are_kept_in_proportion():
     points = np.full((100, 3), 0.5)
     _keep, weight = _resample(points, np.ones((100, 3)), 64, 0.1)
     assert abs(weight.sum() - 100) <= 2
+
+
+def test_of_more_lamps_than_points_those_drawn_stand_for_all(monkeypatch):
+    """Over all starts of the comb each lamp weighs 1 in the mean; weak ones are drawn now and then."""
+    monkeypatch.setattr(virtual_lights, "answered", lambda frame, emitter: False)
+    power = np.random.default_rng(5).random(24) ** 6 * 50 + 0.01
+    lamp = SimpleNamespace(cast_shadow=True, links=SimpleNamespace(passing=()))
+
+    def emitter(number):
+        def row(sample, first, count, weight, points):
+            return lights.LIGHT.rows(radiance=weight, radius=number)
+
+        return SimpleNamespace(
+            power=power[number], has_span=False, radius=0.0, is_narrow=lambda receivers: False,
+            sample=lambda *numbers: None, row=row, light=lamp,
+        )  # fmt: skip
+
+    own = SimpleNamespace(_emitters=[emitter(k) for k in range(len(power))])
+    mean, starts = np.zeros(len(power)), (np.arange(4000) + 0.5) / 4000
+    for u in starts:
+        frame = SimpleNamespace(
+            uniform=lambda name, u=u: u, random_volume=lambda *name: np.zeros(3), sample=0, receivers=None,
+            settings=SimpleNamespace(samples=1),
+        )  # fmt: skip
+        rows = virtual_lights.VirtualLights._light_rows(own, frame, 6)
+        assert len(rows) <= 6
+        for row in rows:
+            mean[int(row[lights.LIGHT.at.radius])] += row[lights.LIGHT.at.radiance][0] / len(starts)
+    np.testing.assert_allclose(mean, 1.0, atol=0.02)
