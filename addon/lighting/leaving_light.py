@@ -1,14 +1,16 @@
 """Light that leaves surfaces below which it scatters, for whoever sees them but the camera: bounces, mirrors, fog.
 
-Once a sample, when somebody asks, walks from each point of the mesh (scene/scatter_points.py) find what leaves there of
-the direct light of all points; their mean over the samples so far, with a grid of voxels around each object, stands in
-one list, an image, so that rays find it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a
-diffuse surface would send. Of indirect light they send on what leaves on the side where it came from.
+In samples in which somebody asks, walks from points of the mesh (scene/scatter_points.py) find what leaves there of
+the direct light of all points: from all of them in the first sample, later from every `stride`-th row in turn. Their mean
+over the samples so far, with a grid of voxels around each object, stands in one list, an image, so that rays find it where
+they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The list is written
+anew when the number of samples has doubled, or by RENEWED more. Of indirect light they send on what leaves on the side
+where it came from.
 
 | cost | per sample |
 |---|---|
-| rays | a point: `walks` times about 2 / (1 - albedo)^(1/2) + 2 |
-| passes | 2 |
+| rays | a point: `walks` / `stride` times about 2 / (1 - albedo)^(1/2) + 2 |
+| passes | 1, and 1 where the list is written |
 | bytes | 176 a point, up to 32 for each of 64^3 voxels an instance |
 
 Bias: even over a point's cell; colours and radii are the means of their material; of indirect light what leaves on the
@@ -33,6 +35,7 @@ from ..scene.view import VIEW
 from ..surfaces.hits import Hits
 from .walked_light import FEW_WALKS
 
+RENEWED = 16  # samples after which the list is written anew, at most
 WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 5, images.LIST_WIDTH
 LEFT = ("sent", "slope", "same", "red", "green", "blue")
 LEAVING = passes.fullscreen_program(
@@ -47,7 +50,9 @@ LEAVING = passes.fullscreen_program(
         )),
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("FLOAT", "offset_size")),
+    constants=(
+        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("FLOAT", "offset_size"),
+    ),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
     outputs=tuple(("VEC4", f"out_{name}") for name in LEFT),
 )  # fmt: skip
@@ -70,6 +75,12 @@ class LeavingService(Service):
     image: Callable[[], images.Image | None]
 
 
+def stride_of(samples: int) -> int:
+    """Of how many rows of points one has walks in a sample after the first: 1 of up to 8 samples, 2 of 16, 4 of 64. So
+    points have 8 walks and more, and the more samples, the more of them."""
+    return max(int((samples / 4) ** 0.5), 1)
+
+
 def _leaving(frame: Frame) -> dict[str, images.Image] | None:
     service = frame.service(LeavingService)
     image = None if service is None else service.image()
@@ -86,6 +97,7 @@ class LeavingLight:
         self.image: images.Image | None = None
         self._rows = 0  # of the image, that points take
         self._sums: images.Target | None = None  # of LEFT, over the samples so far
+        self._drawn = 0  # samples in these
 
     def begin(self) -> None:
         """A picture begins."""
@@ -103,8 +115,9 @@ class LeavingLight:
         flags[[k for k in walked if k < len(flags)]] = 1.0
         self.image = images.upload_list(np.concatenate([head, cells, instances, points.voxels]))
 
-    def draw(self, frame: Frame, points: ScatterPoints, textures: dict[str, images.Image]) -> None:
-        """Find what leaves in this sample. `textures`: cell_direct, cell_shapes, scatter_means and walk_lobes."""
+    def draw(self, frame: Frame, points: ScatterPoints, textures: dict[str, images.Image]) -> int:
+        """Find what leaves in this sample; returns the number of passes. `textures`: cell_direct, cell_shapes,
+        scatter_means and walk_lobes."""
         hierarchy, settings = frame.hierarchy("shadow"), frame.settings
         owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
         position, normal = points.surface(frame.sample)
@@ -122,8 +135,12 @@ class LeavingLight:
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
                 "walks": 1 if settings.schedule.is_draft else max(FEW_WALKS // settings.samples, 1),
+                "stride": stride_of(settings.samples) if self._drawn else 1,
             },
         )  # fmt: skip
+        self._drawn += 1
+        if self._drawn % RENEWED and self._drawn & (self._drawn - 1):
+            return 1
         passes.fullscreen(
             LIST, images.Target((self.image,)), viewport=(0, 1, WIDTH, self._rows),
             textures={
@@ -131,12 +148,13 @@ class LeavingLight:
                 "point_normal": normal,
             },
         )  # fmt: skip
+        return 2
 
     def _give(self) -> None:
         if self._sums is not None:
             for image in self._sums.colors:
                 images.pool.give(image)
-        self._sums = None
+        self._sums, self._drawn = None, 0
 
     def release(self) -> None:
         """Drop GPU resources."""

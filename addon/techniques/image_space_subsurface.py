@@ -315,7 +315,7 @@ class ImageSpaceSubsurface(Technique):
         """What leaves the points' surfaces in this sample, for others; None where nothing is drawn."""
         if self._leaving_sample != frame.sample:
             direct = self._directly_lit(frame)
-            self._leaving.draw(
+            drawn = self._leaving.draw(
                 frame, self.points,
                 {
                     "cell_direct": direct, "cell_shapes": self._shapes, "walk_lobes": self._lobes,
@@ -323,7 +323,7 @@ class ImageSpaceSubsurface(Technique):
                 },
             )  # fmt: skip
             self._leaving_sample = frame.sample
-            frame.count(self, "passes", 2)
+            frame.count(self, "passes", drawn)
         return self._leaving.image
 
     def _light_indirectly(self, frame: Frame, position, normal, indirect: images.Image) -> None:
