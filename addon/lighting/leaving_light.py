@@ -1,11 +1,11 @@
 """Light that leaves surfaces below which it scatters, for whoever sees them but the camera: bounces, mirrors, fog.
 
 In samples in which somebody asks, walks from points of the mesh (scene/scatter_points.py) find what leaves there of
-the direct light of all points: from all of them in the first sample, later from every `stride`-th row in turn. Their mean
-over the samples so far, with a grid of voxels around each object, stands in one list, an image, so that rays find it where
-they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The list is written
-anew when the number of samples has doubled, or by RENEWED more. Of indirect light they send on what leaves on the side
-where it came from.
+the direct light of all points: from all of them in the first sample, later from every `stride`-th row in turn. Their
+mean over the samples so far, with a grid of voxels around each object, stands in one list, an image, so that rays find
+it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The list
+is written anew when the number of samples has doubled, or grown by RENEWED. Of indirect light they send on what leaves
+on the side where it came from.
 
 | cost | per sample |
 |---|---|
@@ -76,8 +76,8 @@ class LeavingService(Service):
 
 
 def stride_of(samples: int) -> int:
-    """Of how many rows of points one has walks in a sample after the first: 1 of up to 8 samples, 2 of 16, 4 of 64. So
-    points have 8 walks and more, and the more samples, the more of them."""
+    """Of how many rows of points one has walks in a sample after the first: 1 of fewer than 16 samples, 2 of 16, 4
+    of 64. So points have 8 walks and more, and the more samples, the more of them."""
     return max(int((samples / 4) ** 0.5), 1)
 
 

@@ -1,7 +1,8 @@
 // The mean of what walks bring over places of the object around, per channel within half a free path and a fraction of the
 // pixels' window: light from beyond the window changes over no less; of many walks less is asked, by the fourth root of
-// their number, so that what it blurs goes with them (lighting/walked_light.py), and of one sample all, whose outlines are hard. Pixels come in pairs, one on either side, so that
-// light which rises or falls evenly stays as it is, mostly so at edges.
+// their number, so that what it blurs goes with them (lighting/walked_light.py), and of one sample all, whose outlines are
+// hard. Pixels come in pairs, one on either side, so that light which rises or falls evenly stays as it is. Where the other one
+// shows something else, at outlines, a pixel counts the less the more walks there are: there light rises inwards.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "subsurface/image.glsl"
@@ -9,7 +10,7 @@
 #include "subsurface/walked.glsl"
 
 #define PAIRS 12
-#define ALONE 0.3     // of a pixel's weight where its other one shows something else: less noise for some bias
+#define ALONE 0.3     // of a pixel's weight where its other one shows something else, of few walks: less noise for some bias
 #define GOLDEN 2.39996323
 #define PATHS 0.5     // free paths, and
 #define PIXELS 0.6     // or widths of a pixel
@@ -49,6 +50,7 @@ void main()
   vec3 free_path = max(spread_length_fetch(pixel).xyz, vec3(LEAST_SCALE));
   float many = float(samples * walks_of_pixel(walks, most_walks, dense_walks, pixel_size, free_path)) / float(FEW_WALKS);
   float narrowness = pow(clamp(many, 1.0, float(samples * samples)), -0.25);
+  float alone = ALONE * pow(narrowness, 4.0);
   vec3 wide = max(narrowness * min(PATHS * free_path, vec3(WINDOWS * range)), vec3(PIXELS * narrowness * pixel_size));
   float widest = max_component(wide);
   vec3 narrower = vec3(0.5) / (wide * wide) - vec3(0.5 / (widest * widest));
@@ -73,8 +75,8 @@ void main()
     vec3 weight1 = tap_weight(other, object, position, normal, face, widest + pixel_size, narrower);
     vec3 weight2 = tap_weight(across, object, position, normal, face, widest + pixel_size, narrower);
     vec3 both = min(weight1, weight2);
-    weight1 = mix(both, weight1, ALONE);
-    weight2 = mix(both, weight2, ALONE);
+    weight1 = mix(both, weight1, alone);
+    weight2 = mix(both, weight2, alone);
     if (max_component(weight1) > 0.0) {
       direct += weight1 * walked_direct_fetch(other).rgb;
       indirect += weight1 * walked_indirect_fetch(other).rgb;

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon.lighting import leaving_light
 from tests.techniques.foggy_stage import box, volume
 from tests.techniques.test_image_space_subsurface import WALK, scattering, shown, sphere
 
@@ -23,6 +24,13 @@ def test_light_that_comes_through_a_slab_reaches_the_floor_below(stage):
     floor = np.mean(pictures, axis=0)[2:6, 8:16].mean(axis=(0, 1))
     print(f"floor {floor.round(4)}")
     assert floor == pytest.approx((0.175, 0.286, 0.301), rel=0.1)
+
+
+@pytest.mark.parametrize("samples", [8, 16, 20, 64, 1024])
+def test_every_point_has_eight_walks_or_more(samples):
+    """Points far from the first row have the fewest: all in the first sample, then each in one of `stride`."""
+    stride = leaving_light.stride_of(samples)
+    assert 1 + (samples - 1) // stride >= 8
 
 
 def test_fog_is_lit_by_what_comes_through_wax(stage):
