@@ -4,9 +4,10 @@ shaders/micro/buffer.glsl fills one, by a thread that goes through the tree; sha
 the radiance of what it shows, which is the irradiance over pi, since its pixels are equal shares of cosine-weighted
 solid angle. Here are the radiance of nodes (`NodeRadiance`), from that of the points up, and light that is reflected
 again and again: every one of `groups` groups of points has one of its points gather for all that see it, for both
-sides, and what arrives is reflected by each with its own albedo. What each sees does not change from one reflection to
-the next, so its micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3:
-Jacobi iteration).
+sides, and what arrives is reflected by each with its own albedo; at the last bounce gloss mirrors the part of it that
+comes from one direction (shaders/micro/directed.glsl). What each sees does not change from one reflection to the next,
+so its micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3: Jacobi
+iteration).
 
 | cost | for n points, G groups, K x K pixels |
 |---|---|
@@ -62,14 +63,18 @@ ARRIVING = passes.fullscreen_program(
     constants=(("INT", "micro_side"), ("INT", "id_bits")),
     outputs=(("VEC4", "out_arriving"),),
 )
-ARRIVING_IN_MEDIA = answered(
-    replace(
-        ARRIVING, textures=(*ARRIVING.textures, BUFFER_TEXTURES[0]),
-        defines=(("NODE_ROW", str(NODE_ROW)), ("PLACES", "1")),
-        constants=(*ARRIVING.constants, ("INT", "leaf_count"), ("INT", "group_count"), ("VEC4", "buffer_choice")),
-    ),
-    (MEDIA,),
+ARRIVING_AT_PLACES = replace(
+    ARRIVING, textures=(*ARRIVING.textures, BUFFER_TEXTURES[0]), defines=(("NODE_ROW", str(NODE_ROW)),),
+    constants=(*ARRIVING.constants, ("INT", "leaf_count"), ("INT", "group_count"), ("VEC4", "buffer_choice")),
 )  # fmt: skip
+ARRIVING_WITH_WAYS = replace(  # for gloss, the mean direction that it comes from, too
+    ARRIVING_AT_PLACES, name="light arriving at groups, and its ways",
+    defines=(*ARRIVING_AT_PLACES.defines, ("WAYS", "1")), outputs=(*ARRIVING.outputs, ("VEC4", "out_way")),
+)  # fmt: skip
+ARRIVING_IN_MEDIA, ARRIVING_WITH_WAYS_IN_MEDIA = (
+    answered(replace(one, defines=(*one.defines, ("PLACES", "1"))), (MEDIA,))
+    for one in (ARRIVING_AT_PLACES, ARRIVING_WITH_WAYS)
+)
 SENT = passes.fullscreen_program(
     "light sent by points",
     "micro/leaf.frag.glsl",
@@ -78,6 +83,11 @@ SENT = passes.fullscreen_program(
     defines=(("NODE_ROW", str(NODE_ROW)), ("POINT_ROW", str(ROW)), ("COVER", str(COVER))),
     outputs=(("VEC4", "out_sent"),),
 )
+SENT_APART = replace(  # without what gloss mirrors
+    SENT, name="light sent by points, gloss apart",
+    textures=(*SENT.textures, *(("RGBA32F", name) for name in ("gloss", "point_normal", "arriving_way"))),
+    defines=(*SENT.defines, ("WAYS", "1")),
+)  # fmt: skip
 SHARES = passes.fullscreen_program(
     "groups that points take light from",
     "micro/shares.frag.glsl",
@@ -104,9 +114,18 @@ LOBES = passes.fullscreen_program(
     textures=tuple(("RGBA32F", name) for name in ("sent", "direct", "across", "ways", "gloss", "point_normal")),
     outputs=tuple(("VEC4", f"out_{name}") for name in ("flux", "ways", "thrown", "all")),
 )
+BOUNCED = passes.fullscreen_program(
+    "bounced light of gloss at points",
+    "micro/bounced.frag.glsl",
+    textures=(
+        *(("RGBA32F", name) for name in ("gloss", "point_normal", "arriving", "arriving_way")), ("R32F", "shares"),
+    ),
+    defines=(("NODE_ROW", str(NODE_ROW)),),
+    outputs=(("VEC4", "out_flux"), ("VEC4", "out_ways")),
+)  # fmt: skip
 LOBE_TEXTURES = tuple(("RGBA32F", f"node_{name}") for name in ("flux", "ways", "thrown"))  # of gloss by direction
 PROGRAMS = (CLIPS, OF_GROUPS, ARRIVING, SENT, SHARES, PULL_POINTS, PULL)
-DIRECTED_PROGRAMS = (*PROGRAMS, LOBES)  # where the run has gloss apart
+DIRECTED_PROGRAMS = (*PROGRAMS, LOBES, ARRIVING_WITH_WAYS, SENT_APART, BOUNCED)  # where the run has gloss apart
 
 
 def parts(leaves: int, side: int) -> list[tuple[int, int]]:
@@ -142,6 +161,11 @@ def buffer_bindings(frame: Frame, run: Run, side: int, threshold: float, centre_
     }  # fmt: skip
 
 
+def _gloss(run: Run) -> dict[str, images.Image]:
+    """Of the points of a run that is directed: albedo and roughness of gloss, and normals."""
+    return {"gloss": run.shaded.colors[4], "point_normal": run.shaded.colors[1]}
+
+
 class NodeRadiance:
     """Radiance of all nodes of a run's tree in this sample, and `lobes`, of what gloss sends by direction (flux, ways
     and, where mirrors throw caustics, what photons bring of it, shaders/micro/lobes.frag.glsl), where the run has gloss
@@ -172,18 +196,20 @@ class NodeRadiance:
         sent = held[0]
         try:
             yield
+            lobes: list[images.Image] = []
             if run.directed:
-                held += [images.pool.take(*run.size, "RGBA32F") for _ in LOBES.outputs]
-                every = self._send_lobes(frame, technique, run, lit, sent, held[-len(LOBES.outputs) :])
-                direct = every if bounces > 0 else direct
-            self._send(frame, technique, run, direct, direct, direct, 0, sent)
+                lobes = [images.pool.take(*run.size, "RGBA32F") for _ in LOBES.outputs]
+                held += lobes
+                self._draw_lobes(frame, technique, run, lit, sent, lobes)
+                direct = lobes[-1] if bounces > 0 else direct
+            self._send(frame, technique, run, sent, SENT, {"direct": direct, "arriving": direct, "shares": direct})
             if bounces > 0:
                 groups = min(groups, leaves // 2)
                 size = (NODE_ROW, max(2 * groups // NODE_ROW, 1))
                 micro = images.pool.take(size[0] * GROUP_SIDE, size[1] * GROUP_SIDE, "R32UI")
-                arriving = images.pool.take(*size, "RGBA32F")
+                arriving = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(1 + run.directed)))
                 shares = images.pool.take(*run.size, "R32F")
-                held += [micro, arriving, shares]
+                held += [micro, *arriving.colors, shares]
                 constants = buffer_bindings(frame, run, GROUP_SIDE, threshold, centre_test, "micro groups")
                 gathering, active = _gathering(run.seen, groups, constants["buffer_choice"][0])
                 for part in parts(leaves, GROUP_SIDE):
@@ -207,52 +233,60 @@ class NodeRadiance:
                 frame.count(technique, "passes")
                 frame.count(technique, "gathers of points", active)
                 media = frame.service(MediaService)
-                program = ARRIVING if media is None else ARRIVING_IN_MEDIA
-                textures = {} if media is None else {"tree_nodes": run.nodes, **media.bindings}
+                there = {} if media is None else media.bindings
+                sums = ARRIVING if media is None else ARRIVING_IN_MEDIA
                 constants |= {"group_count": groups}
+                gathered = {"direct": direct, "arriving": arriving.colors[0], "shares": shares}
                 for bounce in range(bounces):
-                    direct = lit[0] if bounce == bounces - 1 else direct  # pixels see gloss by direction
+                    into, program = images.Target(arriving.colors[:1]), SENT
+                    if run.directed and bounce == bounces - 1:  # pixels see gloss by direction
+                        sums = ARRIVING_WITH_WAYS if media is None else ARRIVING_WITH_WAYS_IN_MEDIA
+                        into, program = arriving, SENT_APART
+                        gathered |= {"direct": lit[0], "arriving_way": arriving.colors[1], **_gloss(run)}
+                    textures = {"micro": micro, "node_radiance": self.image, "tree_nodes": run.nodes} | there
                     passes.fullscreen(
-                        program, images.Target((arriving,)),
-                        textures={"micro": micro, "node_radiance": self.image, **textures},
-                        constants={name: constants[name] for _, name in program.constants},
+                        sums, into, textures={name: textures[name] for _, name in sums.textures},
+                        constants={name: constants[name] for _, name in sums.constants},
                     )  # fmt: skip
-                    self._send(frame, technique, run, direct, arriving, shares, groups, sent)
+                    self._send(frame, technique, run, sent, program, gathered, groups)
+                if run.directed:
+                    passes.fullscreen(
+                        BOUNCED, images.Target(tuple(lobes[:2])), blend="ADDITIVE_PREMULT",
+                        textures={name: gathered[name] for _, name in BOUNCED.textures},
+                    )  # fmt: skip
+                    frame.count(technique, "passes")
                 frame.count(technique, "bounces", bounces)
+            for k, image in enumerate(lobes[: len(self._of_lobes)]):
+                self._of_lobes[k], drawn = self._pulled(leaves, image, self._of_lobes[k])
+                frame.count(technique, "passes", drawn)
         finally:  # also where a viewport drops the sample
             for image in held:
                 images.pool.give(image)
 
-    def _send(self, frame, technique, run: Run, direct, arriving, shares, groups: int, sent: images.Image) -> None:
-        self._draw_sent(run, direct, arriving, shares, groups, sent)
+    def _send(
+        self, frame, technique, run: Run, sent: images.Image, program: Program, textures: dict, groups: int = 0
+    ) -> None:
+        self._draw_sent(run, sent, program, textures, groups)
         self.image, drawn = self._pulled(run.tree.leaves, sent, self.image)
         frame.count(technique, "passes", drawn + 1)
 
-    def _draw_sent(self, run: Run, direct, arriving, shares, groups: int, sent: images.Image) -> None:
+    @staticmethod
+    def _draw_sent(run: Run, sent: images.Image, program: Program, textures: dict, groups: int) -> None:
         passes.fullscreen(
-            SENT, images.Target((sent,)), constants={"leaf_count": run.tree.leaves, "group_count": groups},
-            textures={
-                "tree_nodes": run.nodes, "direct": direct, "albedo": run.albedo, "arriving": arriving,
-                "shares": shares,
-            },
+            program, images.Target((sent,)), constants={"leaf_count": run.tree.leaves, "group_count": groups},
+            textures={"tree_nodes": run.nodes, "albedo": run.albedo, **textures},
         )  # fmt: skip
 
-    def _send_lobes(self, frame, technique, run: Run, lit, sent: images.Image, into) -> images.Image:
-        """Flux and ways of all nodes, and direct light with gloss as of diffuse surfaces. `into`: images of LOBES."""
+    def _draw_lobes(self, frame, technique, run: Run, lit, sent: images.Image, lobes: list[images.Image]) -> None:
+        """What gloss sends of direct light, into images of LOBES."""
         direct, across, ways = lit
-        self._draw_sent(run, direct, direct, direct, 0, sent)  # for the areas
+        areas = {"direct": direct, "arriving": direct, "shares": direct}
+        self._draw_sent(run, sent, SENT, areas, 0)
         passes.fullscreen(
-            LOBES, images.Target(tuple(into)),
-            textures={
-                "sent": sent, "direct": direct, "across": across, "ways": ways, "gloss": run.shaded.colors[4],
-                "point_normal": run.shaded.colors[1],
-            },
+            LOBES, images.Target(tuple(lobes)),
+            textures={"sent": sent, "direct": direct, "across": across, "ways": ways, **_gloss(run)},
         )  # fmt: skip
         frame.count(technique, "passes", 2)
-        for k, image in enumerate(into[: len(self._of_lobes)]):
-            self._of_lobes[k], drawn = self._pulled(run.tree.leaves, image, self._of_lobes[k])
-            frame.count(technique, "passes", drawn)
-        return into[-1]
 
     def _pulled(self, leaves: int, sent: images.Image, image: images.Image) -> tuple[images.Image, int]:
         """Means of all nodes, in `image` or in the spare one, which takes its place; and how many passes."""

@@ -8,8 +8,9 @@ Pixels of the buffer are equal shares of what the surface reflects, so light is 
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
-Where gloss is, nodes have what it sends of direct light, too: a lobe of von Mises and Fisher about where mirrors would
-send it, as mean direction and flux, which average over a tree. What photons bring of mirrors is left out.
+Where gloss is, nodes have what it sends, too: a lobe of von Mises and Fisher about where mirrors would send direct
+light, and of bounced light the part that comes from one direction, as mean direction and flux, which average over a
+tree. What photons bring of mirrors is left out.
 
 Diffuse light is gathered by regions and interpolated as in multires_radiosity.py; lobes of microfacets by each pixel,
 whose micro-buffer has rays of the lobe. Groups of points gather further bounces. Each sample has other points.
@@ -26,8 +27,8 @@ through the middles of pixels (there a group fills one pixel); both sides of poi
 Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). A kilometre of ground takes all points.
 Bias (diffuse and glossy indirect light): a piece sends the light of one place on it as far as nothing stands between
 (shaders/micro/clips.frag.glsl); of more triangles than half of the points the smallest have discs, which reach over
-edges: leaves, grass and hair are wrong. Gloss of a point has one lobe for all lamps, and is diffuse to bounced light.
-Sheen and translucent lobes get none, clear glass is not there.
+edges: leaves, grass and hair are wrong. Gloss of a point has one lobe for all lamps and the last bounce, and is diffuse
+in the bounces before. Sheen and translucent lobes get none, clear glass is not there.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
-// Irradiance at the points that gather for their groups, from their micro-buffers.
+// Irradiance at the points that gather for their groups, from their micro-buffers. WAYS: and `out_way`, the mean direction that it
+// comes from, times its luminance.
 #include "lib/math.glsl"
-#ifdef PLACES
+#ifdef WAYS
+#include "micro/gathering_frame.glsl"
+#elif defined(PLACES)
 #include "micro/gathering.glsl"
 #endif
 #define NOTHING 0xffffffffu
@@ -17,7 +20,11 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec3 place = vec3(0.0);
-#ifdef PLACES
+#ifdef WAYS
+  MicroFrame f = gathering_frame(pixel.y * NODE_ROW + pixel.x);
+  place = f.place;
+  out_way = vec4(micro_way(pixel * micro_side, f), 0.0);
+#elif defined(PLACES)
   vec3 axis;
   place = leaf_middle(gathering_leaf((pixel.y * NODE_ROW + pixel.x) >> 1), axis);
 #endif

@@ -11,7 +11,7 @@
 //
 // With GLOSSY the pixels are equal shares of what microfacets reflect to the viewer instead: each has a ray of the lobe, and
 // nodes beside the cone about all rays are left out.
-#include "micro/warp.glsl"
+#include "micro/frame.glsl"
 #define NOTHING 0xffffffffu
 #define ROUND 0.2  // of the size of a flat group that is drawn as one disc: up to there a bent one is drawn as a ball
 #define ITSELF 1e-3  // half lengths of a piece within which what is seen of it is where one looks from
@@ -24,48 +24,6 @@
 vec4 node_texel(int index)
 {
   return tree_nodes_fetch(ivec2(index & 2047, index >> 11));
-}
-
-struct MicroFrame {
-  vec3 place;
-  vec3 tangent;
-  vec3 bitangent;
-  vec3 normal;
-  vec3 plane;  // normal of the triangle: nothing is seen below it
-  vec2 shift;  // of a pixel's middle, 0..1
-#ifdef GLOSSY
-  Lobe lobe;
-  vec3 axis;   // of the cone that holds all rays
-  float angle; // and half its angle, radians
-#endif
-};
-
-// Where the ray of a pixel goes. Of a lobe: and what light from there counts.
-vec3 micro_ray(MicroFrame f, ivec2 pixel, out vec3 weight)
-{
-#ifdef GLOSSY
-  return lobe_sample(f.lobe, (vec2(pixel) + f.shift) / float(micro_side), weight);
-#else
-  weight = vec3(1.0);
-  vec2 disc = disc_of_square((vec2(pixel) + f.shift) * (2.0 / float(micro_side)) - 1.0);
-  return disc.x * f.tangent + disc.y * f.bitangent + sqrt(max(1.0 - dot(disc, disc), 0.0)) * f.normal;
-#endif
-}
-
-MicroFrame micro_frame(vec3 place, vec3 normal, vec3 plane, vec3 turn_and_shift)
-{
-  MicroFrame f;
-  f.place = place;
-  f.normal = normal;
-  f.plane = plane;
-  vec3 first;
-  vec3 second;
-  orthonormal_basis(normal, first, second);
-  float turn = 2.0 * PI * turn_and_shift.x;
-  f.tangent = cos(turn) * first + sin(turn) * second;
-  f.bitangent = cross(normal, f.tangent);
-  f.shift = turn_and_shift.yz;
-  return f;
 }
 
 void micro_store(ivec2 texel, float depth, int node, bool behind)

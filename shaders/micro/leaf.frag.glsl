@@ -1,5 +1,9 @@
-// Radiance that each side of each point sends: of direct light, and of what its group gathered. w: its area.
+// Radiance that each side of each point sends: of direct light, and of what its group gathered. w: its area. WAYS: without what
+// gloss mirrors of the part that comes from one direction (micro/bounced.frag.glsl).
 #include "lib/math.glsl"
+#ifdef WAYS
+#include "micro/directed.glsl"
+#endif
 
 void main()
 {
@@ -13,7 +17,15 @@ void main()
   vec3 sent = direct_fetch(pixel).rgb;
   if (group_count > 0) {
     int group = int(shares_fetch(pixel).x);
-    sent += albedo_fetch(pixel).rgb * (1.0 / PI) * arriving_fetch(ivec2(group % NODE_ROW, group / NODE_ROW)).rgb;
+    ivec2 gathered = ivec2(group % NODE_ROW, group / NODE_ROW);
+    vec3 arriving = arriving_fetch(gathered).rgb;
+    vec3 albedo = albedo_fetch(pixel).rgb;
+#ifdef WAYS
+    vec3 normal = octahedral_decode(point_normal_fetch(pixel).xy);
+    float mirrored = directed_share(arriving_way_fetch(gathered).xyz, luminance(arriving), normal).w;
+    albedo = max(albedo - mirrored * gloss_fetch(pixel).rgb, vec3(0.0));
+#endif
+    sent += albedo * (1.0 / PI) * arriving;
   }
   // A point that is not there (its material has no surface) sends nothing, but what lies behind it is hidden.
   bool finite = is_finite(sent.r + sent.g + sent.b);

@@ -2,11 +2,8 @@
 // `out_ways`, the mean of these directions times its luminance, so that both are means over what is below a node. w: the
 // area. `out_all`: direct light with the same as of a diffuse surface, for groups, which do not look at directions. `out_thrown`: of
 // the flux what photons bring to diffuse surfaces of the picture, and to no others.
-//
-// The lobe is one of von Mises and Fisher about the mirrored light. Facets of roughness alpha deviate from the normal like
-// one of sharpness 2 / alpha^2, directions that they mirror like one of a quarter of that over the cosine (Wang, Ren, Gong,
-// Snyder & Guo 2009, "All-frequency rendering of dynamic, spatially-varying reflectance").
 #include "lib/math.glsl"
+#include "micro/spread.glsl"
 
 void main()
 {
@@ -22,11 +19,8 @@ void main()
   flux = finite ? max(flux, vec3(0.0)) : vec3(0.0);
   vec3 mean = finite ? mirrored.xyz / mirrored.w : vec3(0.0);
   float cosine = clamp(dot(mean, axis), 0.0, 1.0);
-  float alpha = lobe.w * lobe.w;
-  float sharpness = 0.5 / max(alpha * alpha * max(cosine, 0.05), 1e-6);
-  float length_of_mean = (1.0 + exp(-2.0 * sharpness)) / (1.0 - exp(-2.0 * sharpness)) - 1.0 / sharpness;
   out_flux = vec4(flux, area);
-  out_ways = vec4(mean * (length_of_mean * luminance(flux)), area);
+  out_ways = vec4(mean * (length_of_mirrored(lobe.w, cosine) * luminance(flux)), area);
   out_thrown = vec4(flux * thrown, area);
   out_all = vec4(direct_fetch(pixel).rgb + flux * (cosine / PI), 0.0);
 }

@@ -2,9 +2,8 @@
 // numbers are their group's first and `chosen` more. `gathering` says which thread draws which entry, and negative for sides
 // from which nothing is seen: their buffers stay empty.
 #include "lib/math.glsl"
-#include "lib/random.glsl"
 #include "micro/buffer.glsl"
-#include "micro/gathering.glsl"
+#include "micro/gathering_frame.glsl"
 
 void main()
 {
@@ -15,12 +14,7 @@ void main()
   int listed = int(gathering_fetch(place).x);
   int entry = abs(listed) - 1;
   place = ivec2(entry % NODE_ROW, entry / NODE_ROW);
-  vec3 axis;
-  vec3 middle = leaf_middle(gathering_leaf(entry >> 1), axis);
-  vec3 normal = axis * (((entry & 1) == 0) ? 1.0 : -1.0);
-  uvec3 salt = hash3(uvec3(uint(entry), 71u, 3u));
-  vec3 own = fract(buffer_choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
-  MicroFrame f = micro_frame(middle, normal, normal, own);
+  MicroFrame f = gathering_frame(entry);
   if (part.x == 0) {
     micro_clear(place * micro_side);
   }

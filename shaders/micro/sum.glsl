@@ -51,3 +51,21 @@ vec4 micro_sum(ivec2 corner, vec3 place)
   }
   return sum * vec4(vec3(PI), 1.0) / float(micro_side * micro_side);
 }
+
+#ifdef WAYS
+// Mean of the directions that the irradiance comes from, times its luminance.
+vec3 micro_way(ivec2 corner, MicroFrame f)
+{
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < micro_side * micro_side; i++) {
+    ivec2 pixel = ivec2(i % micro_side, i / micro_side);
+    uint word = MICRO_WORD(corner + pixel);
+    if (word != NOTHING) {
+      vec3 weight;
+      vec3 radiance = radiance_texel(word & ((1u << uint(id_bits)) - 1u)).rgb * MICRO_PASSING(f.place, word, i);
+      sum += luminance(radiance) * micro_ray(f, pixel, weight);
+    }
+  }
+  return sum * (PI / float(micro_side * micro_side));
+}
+#endif
