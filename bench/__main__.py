@@ -9,7 +9,7 @@ from importlib import import_module
 
 FILES = {"random": "random_scenes", "all": "everything"}  # of verbs that are named otherwise
 NAMES = (
-    "run", "again", "auto", "beside", "bright", "growth", "direct", "indirect", "left", "implicit_visibility",
+    "run", "again", "auto", "beside", "bias", "bright", "growth", "direct", "indirect", "left", "implicit_visibility",
     "media", "memory", "micro_rendering", "cases", "caustics", "prism", "profile", "compiling", "counted",
     "gallery", "glare", "gpu", "grass", "edges", "others", "random", "reflection_costs", "reflections", "relief",
     "strips", "soft_sources", "subsurface", "textures", "trees", "window", "subsurface_costs", "page", "pages",
