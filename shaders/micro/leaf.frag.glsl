@@ -18,14 +18,14 @@ void main()
   if (group_count > 0) {
     int group = int(shares_fetch(pixel).x);
     ivec2 gathered = ivec2(group % NODE_ROW, group / NODE_ROW);
-    vec3 arriving = arriving_fetch(gathered).rgb;
-    vec3 albedo = albedo_fetch(pixel).rgb;
+    vec3 light = arriving_fetch(gathered).rgb;
+    vec3 reflected = albedo_fetch(pixel).rgb;
 #ifdef WAYS
     vec3 normal = octahedral_decode(point_normal_fetch(pixel).xy);
-    float mirrored = directed_share(arriving_way_fetch(gathered).xyz, luminance(arriving), normal).w;
-    albedo = max(albedo - mirrored * gloss_fetch(pixel).rgb, vec3(0.0));
+    float mirrored = directed_share(arriving_way_fetch(gathered).xyz, luminance(light), normal).w;
+    reflected = max(reflected - mirrored * gloss_fetch(pixel).rgb, vec3(0.0));
 #endif
-    sent += albedo * (1.0 / PI) * arriving;
+    sent += reflected * (1.0 / PI) * light;
   }
   // A point that is not there (its material has no surface) sends nothing, but what lies behind it is hidden.
   bool finite = is_finite(sent.r + sent.g + sent.b);
