@@ -8,9 +8,8 @@ Pixels of the buffer are equal shares of what the surface reflects, so light is 
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
-Where gloss is, nodes have what it sends, too: a lobe of von Mises and Fisher about where mirrors would send direct
-light, and of bounced light the part that comes from one direction, as mean direction and flux, which average over a
-tree. What photons bring of mirrors is left out.
+Where gloss is, nodes have its light, too: a lobe about where mirrors would send direct light, and of bounced light what
+comes from one direction, as mean direction and flux, which average over a tree. What photons bring is left out.
 
 Diffuse light is gathered by regions and interpolated as in multires_radiosity.py; lobes of microfacets by each pixel,
 whose micro-buffer has rays of the lobe. Groups of points gather further bounces. Each sample has other points.
