@@ -125,7 +125,8 @@ BOUNCED = passes.fullscreen_program(
 )  # fmt: skip
 LOBE_TEXTURES = tuple(("RGBA32F", f"node_{name}") for name in ("flux", "ways", "thrown"))  # of gloss by direction
 PROGRAMS = (CLIPS, OF_GROUPS, ARRIVING, SENT, SHARES, PULL_POINTS, PULL)
-DIRECTED_PROGRAMS = (*PROGRAMS, LOBES, ARRIVING_WITH_WAYS, SENT_APART, BOUNCED)  # where the run has gloss apart
+# Where the run has gloss apart; with more than two bounces ARRIVING, too.
+DIRECTED_PROGRAMS = (*(one for one in PROGRAMS if one != ARRIVING), LOBES, ARRIVING_WITH_WAYS, SENT_APART, BOUNCED)
 
 
 def parts(leaves: int, side: int) -> list[tuple[int, int]]:

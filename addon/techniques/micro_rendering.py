@@ -180,7 +180,9 @@ class MicroRendering(MultiresRadiosity):
         found = caustic_casters.casters_of(snapshot)
         thrown = not isinstance(found, str) and bool(found.mirrors)
         seen = by_direction(regions, thrown), by_direction(GLOSSY, False)
-        return SEES, *lit_points.DIRECTED_PROGRAMS, *micro_buffers.DIRECTED_PROGRAMS, *seen, REFLECTED
+        gathers = (micro_buffers.ARRIVING,) if settings.bounces > 2 else ()
+        directed = (*lit_points.DIRECTED_PROGRAMS, *micro_buffers.DIRECTED_PROGRAMS, *gathers)
+        return SEES, *directed, *seen, REFLECTED
 
     def begin(self, frame: Frame) -> None:
         if frame.receivers is not None and len(frame.receivers.distance):
