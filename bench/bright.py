@@ -4,24 +4,29 @@ Counts pixels whose surroundings, the mean of the other eight of 3x3, and whose 
 of its 3x3, are FIVE times darker (a small lamp stands alone in both). Such a pixel is light that is found rarely and
 then counts for all that was missed; glare makes a star of it. Said of each is the light path that most of what it has
 more than its surroundings came by. Truth is rendered only where surroundings tell of some. Pictures of ten pages
-(sample files and scenes of glare), the scenes of `bench reflections`, and paths of .blend files. `--page` writes
-docs/reflections.md's table; rows of others stay.
+(sample files and scenes of glare), the scenes of `bench reflections`, and paths of .blend files. `--before CHECKOUT`
+counts them in the pictures of an older working tree, too. `--page` writes docs/reflections.md's table; rows of others
+stay.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
-from bench import markdown
+from bench import ages, markdown
+from bench.beside import Version
 from bench.cells import ROOT
 
 PAGE = ROOT / "docs" / "reflections.md"
 COMMAND = "python -m bench bright --page"
 HEAD = ["scene", "by surroundings", "and truth", "of"]
+BEFORE_COMMAND = "python -m bench bright --before CHECKOUT --page"
+BEFORE_HEAD = ["scene", "before", "now", "of"]
 FIVE = 5.0
 LEAST = 0.02  # of the picture's mean: below it nobody sees a pixel
 SIZE = (128, 96)
@@ -37,6 +42,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--truth-samples", type=int, default=512, help="of Cycles")
     parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")
+    parser.add_argument("--before", type=Path, metavar="CHECKOUT", help="a working tree of an older commit, to compare")
     parser.add_argument("--page", action="store_true", help="write docs/reflections.md's table")
 
 
@@ -47,23 +53,43 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     size = tuple(int(side) for side in options.size.split("x"))
-    rows = markdown.rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, HEAD) if options.page else []
+    older = Version(options.before) if options.before else None
+    command, head = (BEFORE_COMMAND, BEFORE_HEAD) if older else (COMMAND, HEAD)
+    rows = markdown.rows_of(PAGE.read_text(encoding="utf-8"), command, head) if options.page else []
     for name in options.scenes or (*FILES, *BUILT, *reflection_scenes.SCENES, *glass_scenes.SCENES):
         scene = _opened(name)
+        before = luminance(_by(older, options.samples, size)) if older else None
         images = render_passes(scene, "CANDELA", options.samples, 1, size=size).images
         light = luminance(images["combined"])
         alone = found = isolated(light)
-        if alone.any():
-            truth = render_passes(scene, "CYCLES", options.truth_samples, 1, size=size).images["combined"]
-            found = wrong(light, luminance(truth))
-        row = [name, str(int(alone.sum())), str(int(found.sum())), _told(came_by(images, found))]
+        stood = isolated(before) if older else np.zeros_like(alone)
+        if alone.any() or stood.any():
+            truth = luminance(render_passes(scene, "CYCLES", options.truth_samples, 1, size=size).images["combined"])
+            found, stood = wrong(light, truth), wrong(before, truth) if older else stood
+        counts = [str(int(one.sum())) for one in ((stood, found) if older else (alone, found))]
+        row = [name, *counts, _told(came_by(images, found))]
         rows = [*(one for one in rows if one[0] != name), row]
         print("  ".join(row), flush=True)
-        text = f"Isolated bright pixels: {sum(int(one[2]) for one in rows)}.\n\n{markdown.table([HEAD, *rows])}"
+        sums = [sum(int(one[k]) for one in rows) for k in (1, 2)]
+        commit = ages.git("-C", str(options.before.resolve()), "log", "-1", "--format=%h of %cs") if older else ""
+        told = f"{sums[0]} before, at commit {commit}, {sums[1]} now" if older else str(sums[1])
+        text = f"Isolated bright pixels: {told}.\n\n{markdown.table([head, *rows])}"
         if options.page:
-            markdown.put_between(PAGE, COMMAND, text)
+            markdown.put_between(PAGE, command, text)
     print(text)
+    if older:
+        older.end()
     return 0
+
+
+def _by(older: Version, samples: int, size: tuple[int, int]) -> np.ndarray:
+    """The open scene, (H, W, 4), as the other working tree shows it."""
+    import bpy
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+        return older.asked(path, samples, 1, size).pixels
 
 
 def came_by(images: dict[str, np.ndarray], found: np.ndarray) -> Counter[str]:

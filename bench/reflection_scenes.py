@@ -152,10 +152,15 @@ SCENES: dict[str, Callable[[], None]] = {
 
 def make(name: str) -> bpy.types.Scene:
     """The scene of this name in an empty file; what it is measured by and Cycles' bounces stand in its properties."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
     from .glass_scenes import SCENES as GLASS
 
-    (SCENES | GLASS)[name]()
+    return begun(name, (SCENES | GLASS)[name])
+
+
+def begun(name: str, fill: Callable[[], None]) -> bpy.types.Scene:
+    """An empty file with what `fill` puts into it, measured as the scene of this name."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    fill()
     scene = bpy.context.scene
     if name in PATHS:
         scene["paths"] = ",".join(PATHS[name])

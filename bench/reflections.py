@@ -1,18 +1,18 @@
 """Error and time of reflections and refractions beside Cycles and EEVEE: `python -m bench reflections`.
 
 Each scene of `bench/reflection_scenes.py` and `bench/glass_scenes.py` is rendered by Cycles with --reference samples
-(twice, with two seeds, whose difference tells the reference's own noise; kept by content), by Candela with 1 to 64
-samples, by EEVEE with ray tracing and by Cycles with few samples, raw and denoised. The error is relMSE of the picture
-and of what its glossy and transmission passes bring, net of the reference's noise; the mean is the entrant's over the
-reference's. Times are processor seconds of whole renders after one that compiled: on a software GPU they say little
-about a real one.
+or more (twice, with two seeds, whose difference tells the reference's own noise; bench/reflection_truth.py), by Candela
+with 1 to 64 samples, by EEVEE with ray tracing and by Cycles with few samples, raw and denoised. The error is relMSE of
+the picture and of what its glossy and transmission passes bring, net of the reference's noise; the mean is the
+entrant's over the reference's. Times are processor seconds of whole renders after one that compiled: on a software GPU
+they say little about a real one.
 
 `--few`: a row for each scene, whole pictures of 1, 4 and 16 samples, errors no less than a tenth of the reference's
 noise, below which they are not known, and with what light carries the error of the last.
 That is the share of light paths in the squared error of their sum, each pixel weighed as in relMSE: the mean of a
 path's error times the whole error, over that of the whole error's square. Shares add up to one; one is negative where
 its errors hide others'. A second table has the errors beside those of denoised Cycles in as many processor seconds,
-where Cycles' own picture is a truth.
+where Cycles' own picture is a truth. `--size` other than 64x48: the second table alone.
 
 `--page` writes docs/reflections.md's tables; rows of scenes that `--only` does not name stay. `--pictures FOLDER` keeps
 PNG files.
@@ -27,13 +27,15 @@ from pathlib import Path
 
 import numpy as np
 
-from . import ages, equal_time, markdown
+from . import ages, equal_time, markdown, reflection_truth
 from .figures import RESOLVED
-from .study import size
+from .study import size, size_of
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
 FEW_COMMAND = "python -m bench reflections --few --page"
+LARGE_COMMAND = "python -m bench reflections --few --size 256x192 --page"
+SMALL = "64x48"
 NOISE, NO_TRUTH = "noise of the truth", 0.02  # above it Cycles has not found the light, and nothing is compared in time
 FEW_HEAD = [
     "scene", "1 sample", "4", "16", "mean, 16", NOISE, "carries the error, 16", "mean of that",
@@ -76,7 +78,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", help="names of scenes")
     parser.add_argument("--reference", type=int, default=1024, help="samples of each of Cycles' two references")
     parser.add_argument("--few", action="store_true", help="pictures of few samples, one row a scene")
-    parser.add_argument("--size", **size("64x48"))
+    parser.add_argument("--size", **size(SMALL))
     parser.add_argument("--page", action="store_true", help="write docs/reflections.md's tables")
     parser.add_argument("--pictures", type=Path, help="folder for PNG files")
 
@@ -101,7 +103,7 @@ def command(options: argparse.Namespace) -> int:
         _few(order, options)
         return 0
     for name in options.only or order:
-        noise, results = _measure(reflection_scenes.make(name), name, options)
+        noise, results = _measure(name, options)
         table, row = _table(noise, results), _summary(name, results)
         print(f"### {name}", table, markdown.table([SUMMARY_HEAD, row]), sep="\n\n", flush=True)
         if options.page:
@@ -111,10 +113,10 @@ def command(options: argparse.Namespace) -> int:
 
 def _few(order: list[str], options: argparse.Namespace) -> None:
     """Both tables of `--few`. On the page the rows of scenes that were not asked for stay."""
-    page = PAGE.read_text(encoding="utf-8")
+    page, small = PAGE.read_text(encoding="utf-8"), options.size == size_of(SMALL)
+    command = FEW_COMMAND if small else LARGE_COMMAND
     rows, equal = (
-        {one[0]: one for one in markdown.rows_of(page, FEW_COMMAND, head)}
-        for head in (FEW_HEAD, equal_time.head(SAMPLES))
+        {one[0]: one for one in markdown.rows_of(page, command, head)} for head in (FEW_HEAD, equal_time.head(SAMPLES))
     )
     for name in options.only or order:
         rows[name], points = _few_of(name, options)
@@ -124,19 +126,22 @@ def _few(order: list[str], options: argparse.Namespace) -> None:
             equal[name] = equal_time.row(name, points)
             print("  ".join(equal[name]), flush=True)
         shown, beside = ([found[one] for one in order if one in found] for found in (rows, equal))
-        text = f"{markdown.table([FEW_HEAD, *shown])}\n\n{equal_time.table(beside, SAMPLES)}"
+        text = equal_time.table(beside, SAMPLES)
+        text = f"{markdown.table([FEW_HEAD, *shown])}\n\n{text}" if small else text
         if options.page:
-            markdown.put_between(PAGE, FEW_COMMAND, text)
+            markdown.put_between(PAGE, command, text)
     print(text)
 
 
 def _few_of(name: str, options: argparse.Namespace) -> tuple[list[str], equal_time.Points]:
     """Errors of whole pictures, means, the light path that carries the error of the last one, isolated bright pixels
     and processor seconds, beside Cycles of 16 samples, denoised; and the points of all entrants."""
-    from . import bright, reflection_scenes
+    import bpy
 
-    scene = reflection_scenes.make(name)
-    known = _reference(scene, options)
+    from . import bright
+
+    known = reflection_truth.reference(name, options.reference, options.size)
+    scene = bpy.context.scene
     truth, noise = known.images["combined"][..., :3], _noise(known.images["combined"], known.half["combined"])
     _keep(options.pictures, name, "truth", truth)
     for count in (1, 4):
@@ -190,24 +195,17 @@ def _put(name: str, row: list[str], table: str, order: list[str]) -> None:
     markdown.put_between(PAGE, COMMAND, "\n\n".join(parts), stamped=False)
 
 
-def _reference(scene, options: argparse.Namespace):
-    from addon.compare.reference import reference
-
-    return reference(scene, options.reference, size=options.size, extra=_bounces(scene))
-
-
-def _bounces(scene) -> list[tuple]:
-    return [(scene.cycles, "glossy_bounces", scene["glossy_bounces"])] if "glossy_bounces" in scene else []
-
-
 def _noise(mean: np.ndarray, half: np.ndarray) -> float:
     """relMSE of the mean of two renders by half their difference, (H, W, C)."""
     return error((mean + half)[..., :3], (mean - half)[..., :3]) / 4
 
 
-def _measure(scene, name: str, options: argparse.Namespace) -> tuple[dict[str, float], dict[Entrant, Result]]:
+def _measure(name: str, options: argparse.Namespace) -> tuple[dict[str, float], dict[Entrant, Result]]:
     """The reference's noise by path, and what each entrant made."""
-    known = _reference(scene, options)
+    import bpy
+
+    known = reflection_truth.reference(name, options.reference, options.size)
+    scene = bpy.context.scene
     signed = ({key: mean + sign * known.half[key] for key, mean in known.images.items()} for sign in (1, -1))
     references = [_shown(scene, one) for one in signed]
     truth = {key: (references[0][key] + references[1][key]) / 2 for key in references[0]}
@@ -293,7 +291,7 @@ def _render(scene, entrant: Entrant, seed: int, size: tuple[int, int], extra=())
     from addon.compare.reference import render_passes
 
     scene.eevee.use_raytracing = True
-    settings = [*_bounces(scene), *extra]
+    settings = [*reflection_truth.bounces(scene), *extra]
     settings += [(scene.cycles, "use_denoising", True)] if entrant.denoised else []
     start = time.process_time()
     images = render_passes(scene, entrant.engine, entrant.samples, seed, size=size, extra=settings).images

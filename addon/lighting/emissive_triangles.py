@@ -11,7 +11,9 @@ from ..kernels.morton import morton_codes
 from ..materials.compiled import CompiledMaterial
 from ..scene.emission_maps import EmissiveLevel, TriangleEmission
 from ..scene.receivers import Receivers
+from ..snapshot.scene import Instance, Mesh
 from ..sources import lights
+from .caustic_casters import is_convex
 
 LONG = 8.0  # squared longest side by area, from which on a triangle is halved; half a square has 4
 LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
@@ -20,6 +22,7 @@ MOST_SPACED = 256  # points whose distance from each other is measured
 MOST_ASKED = 512  # triangles whose distance from what is lit is measured
 TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
+SOLID = ("camera", "diffuse", "glossy", "transmission", "volume", "shadow")  # what an object lets nothing pass of
 PATHS["volume"] = 0  # media ask for no flag: their lights are those that they see
 
 
@@ -59,8 +62,9 @@ class EmissiveTriangles:
                 local, of_sides = _in_pieces(local, of_sides, known)
             matrix = instance.matrix.copy()
             matrix[:3, 3] -= frame.geometry.origin
+            outwards = _outwards(frame, instance, mesh) if known is None else 0.0
             alike = (of_sides[:, 0] == of_sides[:, 1]).all(axis=1)
-            for side, chosen, sign in ((0, alike, 1.0), (0, ~alike, 1.0), (1, ~alike, -1.0)):
+            for side, chosen, sign in ((0, alike, outwards or 1.0), (0, ~alike, 1.0), (1, ~alike, -1.0)):
                 shining = np.flatnonzero(chosen & (np.abs(of_sides[:, side]).max(axis=1) > 0))
                 if not len(shining):
                     continue
@@ -68,7 +72,7 @@ class EmissiveTriangles:
                 radiance.append(of_sides[shining, side])
                 # A mirrored triangle's corners run the other way round.
                 normals.append(np.full(len(shining), sign * np.sign(np.linalg.det(matrix[:3, :3])) or 1.0))
-                sided.append(np.full(len(shining), chosen is not alike))
+                sided.append(np.full(len(shining), chosen is not alike or outwards != 0.0))
                 flags.append(np.full(len(shining), seen))
                 self.passing += [instance.links.passing] * len(shining)
                 self.unlit += [lights.unlit_bits(instance.links)] * len(shining)
@@ -190,6 +194,24 @@ class EmissiveTriangles:
 
     def _at(self, x: float) -> int:
         return int(np.clip(np.searchsorted(self._edges, x, side="right") - 1, 0, len(self.radiance) - 1))
+
+
+def _outwards(frame: Frame, instance: Instance, mesh: Mesh) -> float:
+    """Of a closed convex mesh that is opaque and not entered, of which only the outside sends light to what is seen: 1
+    where its triangles face outwards, -1 where inwards; of others 0. Rays to its far side would else be lost."""
+    visible = instance.visibility
+    solid = not any(frame.materials.compiled[k].transparent for k in instance.materials) and not instance.links.passing
+    if not (solid and all(getattr(visible, path) for path in SOLID) and is_convex(mesh)):
+        return 0.0
+    camera = frame.snapshot.camera
+    if camera.from_above or camera.bends:
+        return 0.0
+    eye = np.linalg.inv(instance.matrix) @ camera.matrix[:, 3]
+    near = camera.clip_start / max(float(np.cbrt(abs(np.linalg.det(instance.matrix[:3, :3])))), 1e-30)
+    if ((mesh.bounds_min - near <= eye[:3]) & (eye[:3] <= mesh.bounds_max + near)).all():
+        return 0.0
+    corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners]].astype(np.float64) - mesh.bounds_min
+    return float(np.sign(np.linalg.det(corners).sum()))
 
 
 def compact(corners: np.ndarray, radiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -121,6 +121,7 @@ CHOICES = 0.569840291  # from one interface's number to the next, as in caustics
 WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
 VERY_WIDE, MANY = 0.3, 128  # and from which on its image is wide, too: below so many samples it has several points
 MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
+MOST_ALONE = 32  # of a very wide one in a picture's only sample: each is blurred by the light's width over their root
 LEAST_SIDE, LEAST_PART = 48, 32  # photons along a side where points share a grid, and where that is a coarser one
 MOST_REACH = 2.0  # of a light, in diagonals of the casters, whose points share a map
 SPREAD_SIDE = 64  # where nothing makes light converge
@@ -160,7 +161,9 @@ def _points(emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]],
         place = emitter.position(emitter.middle())
         far = [np.linalg.norm((low + high) / 2 - place) for low, high in boxes]
         width = emitter.reach / max(min(far, default=np.inf), 1e-30)
-    few, most_points = (MANY, 2 * MOST_POINTS) if width > VERY_WIDE else (FEW, MOST_POINTS)
+    few, most_points = FEW, MOST_POINTS
+    if width > VERY_WIDE:
+        few, most_points = MANY, max(MOST_ALONE // max(count, 1), 2 * MOST_POINTS)
     most = int(np.clip(few // max(count, 1), 1, most_points)) if width > WIDE else 1
     return 1 << most.bit_length() - 1  # so that all of them are evenly spread
 

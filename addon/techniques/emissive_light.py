@@ -6,7 +6,8 @@ samples so many that the picture has FEWEST_POINTS), each with depth maps. All a
     L(x, v) = mean over samples of  f(x, v, w) cos(w) Le |cos_y| V(x, y) / (|x - y|^2 p(y)),
     p(y) = (lum(Le) + mean of lum) / (2 power)
 
-As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissive triangles by their own rays
+As in Cycles, emission leaves both sides of a surface; of a closed convex mesh that nobody looks into the outside
+counts. Narrow lobes find emissive triangles by their own rays
 (traced_glossy), weighted against these points.
 
 | cost | per sample |
@@ -65,7 +66,8 @@ from ..sources import lights
 from ..surfaces.draw import LIT_SURFACES
 
 SPREAD = 25.0
-FEWEST_POINTS, MOST_POINTS = 32, 16  # in a whole picture, and in one of its samples
+FEWEST_POINTS = 32  # in a whole picture
+MOST_RAYS = 4  # of a pixel in a sample, where it has points of its own, each for several of those
 
 
 MESH_RAYS = Lookup(
@@ -231,12 +233,8 @@ class EmissiveLight(Technique):
         """Points per sample: more where a picture of few samples would have few in all."""
         points = settings.get(self, "points")
         if self._own is not None and self._beside is None:  # a ray of each stands for several points
-            return max(points // 2, min(FEWEST_POINTS // 2 // settings.samples, MOST_POINTS // 4))
-        return (
-            max(points, min(FEWEST_POINTS // settings.samples, MOST_POINTS))
-            if settings.schedule.known_total
-            else points
-        )
+            return max(points // 2, min(FEWEST_POINTS // 2 // settings.samples, MOST_RAYS))
+        return max(points, FEWEST_POINTS // settings.samples) if settings.schedule.known_total else points
 
     def release(self) -> None:
         self._maps.release()

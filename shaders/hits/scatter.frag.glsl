@@ -5,6 +5,9 @@
 // all of them, 1 is mirrored by the first, 2 by one of the others, drawn by mirror_depth. On their way to that one, rays of
 // way 2 add no light: way 0 has it. So what few samples see through panes and bodies of glass is no matter of chance;
 // pictures of many samples go without way 2 and leave it to chance. Way 1 is that of thin coats above other lobes, too.
+//
+// ELSEWHERE: from what `point` shows, drawn at another point of the pixel, where that is the same surface; of the pixel's own
+// colours, as light that is found belongs to those. `share`: of all points' rays.
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
@@ -19,6 +22,25 @@
 #include "caustics/gloss.glsl"
 
 #define LEAST_MIRRORED 0.05  // as in hits/surface.frag.glsl
+
+#ifdef ELSEWHERE
+#include "neighbours/pixel_size.glsl"
+
+// The surface of a pixel with place and normals as at the other point, if that lies on it: normals within 37 degrees, two
+// pixels of the tangent plane, as in film/between.frag.glsl.
+Surface at_other_point(Surface s, ivec2 pixel)
+{
+  Surface other = surface_decode(point_position_fetch(pixel), point_normal_fetch(pixel), vec4(0.0), vec4(0.0),
+                                 point_lobe_fetch(pixel), vec4(0.0));
+  bool same = other.hit && other.kind == s.kind && other.coated == s.coated && dot(other.normal, s.normal) > 0.8
+              && abs(dot(s.normal, other.position - s.position)) < 2.0 * pixel_size_at(s.position);
+  s.position = same ? other.position : s.position;
+  s.normal = same ? other.normal : s.normal;
+  s.geometric_normal = same ? other.geometric_normal : s.geometric_normal;
+  s.glossy_normal = same ? other.glossy_normal : s.glossy_normal;
+  return s;
+}
+#endif
 
 // Which surface behind the first mirrors, of paths that others let pass, and with what chance it is that one.
 int mirror_depth(ivec2 pixel, out float chance)
@@ -40,6 +62,9 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
+#ifdef ELSEWHERE
+  s = at_other_point(s, pixel);
+#endif
   bool both = surface_goes_both_ways(s);
 #ifndef ONWARD
   bool takes_photons = photons_shine != 0 && way == 0 && gloss_takes_photons(s);  // none end on glass, whichever way it goes
@@ -71,7 +96,7 @@ void main()
 #else
   vec3 viewer = TO_VIEWER(s);
   float width = view_pixel() * view_growth(s.position);
-  vec3 throughput = vec3(1.0);
+  vec3 throughput = vec3(share);
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
   bool clear = true;
   int mirrored = 0;

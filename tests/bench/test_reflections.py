@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from bench import reflections, shapes
+from addon.compare.cache import Reference
+from bench import glass_scenes, reflection_scenes, reflection_truth, reflections, shapes
 from bench.shading import glass
 
 
@@ -36,3 +37,19 @@ def test_balls_and_turned_bodies_face_outwards_and_are_closed(registered):
     assert np.allclose(np.linalg.norm([one.co for one in ball.data.vertices], axis=1), 0.5)
     uv = np.array([one.vector for one in ball.data.uv_layers[0].uv])
     assert (uv.min(), uv.max()) == (0.0, 1.0)
+
+
+def test_each_channel_of_a_truth_in_three_parts_is_of_its_own_scene():
+    parts = [
+        Reference({"combined": np.full((2, 3, 4), k)}, {"combined": np.full((2, 3, 4), 0.1 * k)}, 8, 1.0, key=str(k))
+        for k in range(3)
+    ]
+    whole = reflection_truth.joined(parts)
+    assert whole.images["combined"].shape == (2, 3, 3)
+    assert whole.images["combined"][1, 2].tolist() == [0, 1, 2]
+    assert whole.half["combined"][0, 0] == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_scenes_whose_truth_has_parts_or_more_samples_are_there():
+    named = {*reflection_scenes.SCENES, *glass_scenes.SCENES}
+    assert {*reflection_truth.LEAST, *glass_scenes.CHANNELS} <= named

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.lighting import emissive_triangles
 from addon.lighting.emissive_triangles import along_curve, compact
 from addon.materials.energy import pane_passing
 from tests.techniques import light_model as model
@@ -234,6 +235,33 @@ def test_a_glowing_ball_is_as_bright_with_each_seed(floor):
     """In the order of its faces 64 samples deviate by several percent, all pixels together."""
     shares = shares_of_a_ball(floor, 64)
     assert shares.std() < 0.01 and shares.mean() == pytest.approx(1.0, abs=0.02)  # its flat faces hold 1 % less
+
+
+def test_rays_of_hits_ask_no_far_side_of_a_glowing_ball(stage, monkeypatch):
+    """A mirror shows a wall beside the ball: every second ray from there to it was lost. Its light stays."""
+    stage.glow = stage.material("ShaderNodeEmission", Strength=RADIANCE, Color=(1, 1, 1, 1))
+    stage.rectangle((-9, -9), (9, 9), material=stage.principled(Metallic=1.0, Roughness=0.0))
+    stage.rectangle((-4, -4), (4, 4), material=stage.principled(Roughness=1.0), location=(0, 0, 8), turn=(np.pi, 0, 0))
+    glowing_ball(stage, 0.5, 7.0)
+    bpy.data.objects["ball"].visible_camera = True
+    stage.camera((2.5, 0.0, 5.0), (0.0, 0.0, 0.0), angle=0.3)
+    found = []
+    for outwards in (emissive_triangles._outwards, lambda *_: 0.0):
+        monkeypatch.setattr(emissive_triangles, "_outwards", outwards)
+        shown = [stage.render(1, (16, 16), bounces=2, seed=seed)["glossy_indirect"][..., 0] for seed in range(3)]
+        found.append((np.mean(shown), np.mean([np.diff(one, axis=1).std() for one in shown])))
+    (light, noise), (light_before, noise_before) = found
+    assert light == pytest.approx(light_before, rel=0.04)
+    assert noise < 0.7 * noise_before
+
+
+def test_a_glowing_ball_around_the_camera_lights_what_is_in_it(stage):
+    """A floor that sees half of its inside: E = pi L."""
+    stage.glow = stage.material("ShaderNodeEmission", Strength=RADIANCE, Color=(1, 1, 1, 1))
+    stage.floor()
+    glowing_ball(stage, 30.0, 0.0)
+    stage.camera_above(SPAN)
+    assert irradiance(stage, 32).mean() == pytest.approx(np.pi * RADIANCE, rel=0.03)
 
 
 def test_a_faint_lamp_near_by_is_found_beside_a_strong_one_far_away(floor):

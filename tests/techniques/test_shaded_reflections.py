@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 from addon.frame.shares import Turns
+from addon.techniques import shaded_reflections
 from addon.techniques.shaded_reflections import ShadedReflections
+from bench.shading import chequer
 
 from .conftest import places
 
@@ -104,7 +106,6 @@ def test_light_reaches_what_a_mirror_shows(stage):
 
 def test_a_draft_shows_means(stage):
     from addon.frame.settings import Settings
-    from addon.techniques.shaded_reflections import ShadedReflections
 
     stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
     stage.world()
@@ -249,6 +250,41 @@ def test_one_sample_sees_through_a_pane_without_grain(stage):
     found = stage.render(1, (16, 16), bounces=4)["combined"][..., :3]
     assert found.mean() == pytest.approx(0.96**2, rel=0.03)
     assert found.min() > 0.9 and found.max() < 1.0
+
+
+def test_one_sample_averages_what_a_mirror_shows_over_the_pixel(stage, monkeypatch):
+    """A chequer of tiles a fifth of a pixel wide: rays from four points of a pixel have half the noise of one."""
+    stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
+    tiles = stage.material("ShaderNodeEmission", Strength=1.0)
+    emission = next(node for node in tiles.node_tree.nodes if node.type == "EMISSION")
+    tiles.node_tree.links.new(chequer(tiles, 317, (1, 1, 1, 1), (0, 0, 0, 1)), emission.inputs["Color"])
+    ceiling(stage, tiles)
+    stage.camera_above()
+    bpy.context.scene.render.filter_size = 1.5
+    found = {}
+    for rays in (1, 4):
+        monkeypatch.setattr(shaded_reflections, "MORE_RAYS", rays)
+        found[rays] = reflected(stage.render(1, SIZE, bounces=2, seed=rays))[4:-4, 4:-4, 0]
+    assert found[4].mean() == pytest.approx(0.5, abs=0.03)
+    assert found[4].std() < 0.65 * found[1].std()
+
+
+@pytest.mark.parametrize(
+    "shader", ["ShaderNodeBsdfGlossy", pytest.param("ShaderNodeBsdfGlass", marks=pytest.mark.slow)]
+)
+def test_rays_from_elsewhere_in_a_pixel_keep_to_its_own_surface(stage, shader):
+    """Within a shining sphere a smooth ball that loses nothing is not to be seen, its outline included."""
+    around = stage.material("ShaderNodeEmission", Strength=1.0)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=40.0)
+    bpy.context.object.data.materials.append(around)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=2.5, segments=48, ring_count=24)
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.data.materials.append(stage.material(shader, Roughness=0.0, Color=(1, 1, 1, 1)))
+    stage.camera_above()
+    bpy.context.scene.render.filter_size = 1.5
+    found = stage.render(1, SIZE, bounces=16)["combined"][..., :3]
+    assert found.mean() == pytest.approx(1.0, abs=5e-3)
+    assert np.abs(found - 1.0).mean() < 0.01
 
 
 @pytest.mark.parametrize("beside, gathered", [(0.42, True), (0.05, False)])
