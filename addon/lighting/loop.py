@@ -39,6 +39,7 @@ from .asked import asked
 from .caustic_casters import glass_alone
 from .repeated_light import Lit
 from .visibility import (
+    OF_LAYERS,
     RAY_CONSTANTS,
     LightPoint,
     Lookup,
@@ -58,6 +59,7 @@ RAYS_WHERE_NEAR = Lookup(
     "light/near_visibility.glsl",
     textures=acceleration.HIERARCHY_TEXTURES,
     constants=(*RAY_CONSTANTS, ("FLOAT", "near_share")),
+    defines=OF_LAYERS,
 )
 
 

@@ -32,9 +32,7 @@ from .visibility import RAYS, ray_bindings
 
 FEW_POINTS = 16  # on each lamp, of the world and of emissive meshes, in a picture of few samples
 OTHER_POINTS = 4  # of the world and of emissive meshes, in each sample at least
-# With the colours of layers that rays pass; direct light of the picture has its coloured shadows by channel (loop.py).
-_BY_RAYS = lighting(RAYS, False)
-LIGHTING = replace(_BY_RAYS, name="light of points", defines=(*_BY_RAYS.defines, ("LAYERS", "1")))
+LIGHTING = replace(lighting(RAYS, False), name="light of points")
 
 # With where mirrors at the points would send it, for targets of three images.
 LIGHTING_WITH_WAYS = replace(

@@ -168,8 +168,9 @@ class Maps:
     drawing: Iterator[None] = field(default_factory=lambda: iter(()))  # to be exhausted before they are asked
 
 
-# What lookups by rays bind besides the hierarchy.
+# What lookups by rays bind besides the hierarchy, and that light takes the colours of layers that they pass.
 RAY_CONSTANTS = (("FLOAT", "offset_size"),)
+OF_LAYERS = (("LAYERS", "1"),)
 HARD = Lookup("hard", "lib/hard_visibility.glsl")
 EDGES = Lookup(
     "edge rays",
@@ -182,6 +183,7 @@ RAYS = Lookup(
     "light/ray_visibility.glsl",
     textures=acceleration.HIERARCHY_TEXTURES,
     constants=RAY_CONSTANTS,
+    defines=OF_LAYERS,
     maps=False,
 )
 

@@ -43,7 +43,7 @@ OUTSIDE = passes.fullscreen_program(
     snippets=ANSWERS,
     outputs=(("VEC4", "out_emission"),),
 )
-FROM_TILES = tuple(from_tile(count) for count in (1, 2, 6))
+FROM_TILES = tuple(from_tile(count) for count in (1, 2, 3, 6))
 
 
 def draw_seen(frame: Frame, target: images.Target, draw: Draw, blend: str = "NONE") -> None:

@@ -47,6 +47,7 @@ from ..lighting.path_sources import SHOWN, SHOWN_THROUGH
 from ..scene.media import has_media
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
+from ..surfaces.seen_layers import SeenLayers
 from .instant_radiosity import no_diffuse_light
 
 
@@ -69,7 +70,8 @@ FILTERS = {
     "volume_direct": Filter(3.0, 8.0, (1, 2, 4)),
     "volume_indirect": Filter(5.0, 8.0, (1, 2, 4, 8, 1)),
 }
-OF_MEDIA = ("volume_direct", "volume_indirect")  # exchanged along what is seen equally far away; no colour
+# Exchanged along what is seen equally far away, behind layers of one colour; no colour of its own.
+OF_MEDIA = ("volume_direct", "volume_indirect")
 THROUGH_GLASS = ("transmission_direct", "transmission_indirect")  # with their colour, which is what glass shows, too
 GUIDES_OF_LOBES = {"glossy_direct": SHOWN, "glossy_indirect": SHOWN, **dict.fromkeys(THROUGH_GLASS, SHOWN_THROUGH)}
 BY_NEED = OF_MEDIA + THROUGH_GLASS
@@ -255,7 +257,9 @@ class Denoise(Technique):
             begin, end = BEGIN_THROUGH_GLASS, END_OF_MEDIA
         elif path not in OF_MEDIA:
             sums["color_sum"] = frame.images[f"color.{path.split('_')[0]}"]
-        if path not in OF_MEDIA:
+        if path in OF_MEDIA:
+            guides["surface_position"] = frame.kept(SeenLayers).position(frame, self)
+        else:
             guides["normal_sum"] = frame.images["surface.normal_sum"]
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
         half_count, half = self._half(frame, path, count)

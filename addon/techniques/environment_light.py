@@ -93,7 +93,7 @@ def _with_known(lookup: Lookup) -> Lookup:
         name=f"{lookup.name}, irradiance known",
         textures=(*lookup.textures, ("RGBA32F", "irradiance_table"), ("RG32F", "openness")),
         constants=(*lookup.constants, ("FLOAT", "known_share"), ("INT", "bright_count")),
-        defines=(("KNOWN_IRRADIANCE", "1"),),
+        defines=(*lookup.defines, ("KNOWN_IRRADIANCE", "1")),
     )
 
 

@@ -7,6 +7,7 @@
 float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
   if (light.radius <= near_share * length(light.centre - position)) {
+    layers_begin();  // the map is of one channel, and no ray has passed any
     return shadow_visibility(light.first_view, light.view_count, position, normal, LAYERS_SHADE(pixel));
   }
   vec3 direction;

@@ -38,11 +38,14 @@ void main()
 #ifdef AT_HITS
   show(pixel, vec3(0.0), bins.emitted);
 #else
+  out_emission.rgb = bins.emitted;
   if (stride > 1) {
-    out_direct.w = min(ray.limit, 1e18);  // for what spreads this over the pixels around
+    out_direct.w = min(ray.limit, 1e18);  // for what spreads this over the pixels around, and colours what media emit
     out_emission.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
   }
-  out_emission.rgb = bins.emitted * ((bins.count > 0) ? layers_before(pixel, bins.from[0]) : vec3(1.0));
+  else if (bins.count > 0) {
+    out_emission.rgb *= layers_before(pixel, bins.from[0]);
+  }
 #endif
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;

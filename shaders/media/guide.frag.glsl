@@ -1,7 +1,8 @@
 // Light of lamps that media would scatter once towards the eye if nothing cast shadows and nothing were
 // lost on the way to the places: where it peaks, by few places at even steps. What spreads light over pixels (spread.frag.glsl) divides by it.
 //
-// All pixels draw the same numbers, so that what the grids' cells make of them cancels in that.
+// All pixels draw the same numbers, so that what the grids' cells make of them cancels in that. w: where media begin, for
+// the colours of layers before them.
 #define MEDIA_TURNS_APART
 #include "media/asking.glsl"
 #include "media/view_ray.glsl"
@@ -17,6 +18,7 @@ void main()
   uint seed = roll_of(ivec2(0), film_view.sample_index, film_view.seed, 46).x;
   media_asked_by(MEDIA_OF_CAMERA);
   media_bins(ray.origin, ray.direction, ray.limit, seed);
+  out_guide.w = (bins.count > 0) ? bins.from[0] : 0.0;
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;
   }
@@ -60,8 +62,8 @@ void main()
       float per_steradian;
       vec3 found = light_sample(part, position, direction, per_steradian);
       found *= media_scattered(bins.media[k], position, -direction, -ray.direction, seed);
-      sum += found * bin_passing(k, t) / max(density, 1e-30);
+      sum += layers_before(pixel, t) * found * bin_passing(k, t) / max(density, 1e-30);
     }
   }
-  out_guide = vec4((is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z)) ? sum : vec3(0.0), 0.0);
+  out_guide.rgb = (is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z)) ? sum : vec3(0.0);
 }

@@ -2,7 +2,8 @@
 // all 16 numbers of the dither among them, of those whose ray ends about as far away and is hidden about as much.
 //
 // What is spread is light over what is known at each pixel: opacity, so that outlines of media and their detail stay sharp,
-// and what lamps would send without shadows (guide.frag.glsl), so that peaks around them stay where they are.
+// and what lamps would send without shadows (guide.frag.glsl), so that peaks around them stay where they are, and colours
+// of layers on their side of an outline.
 #include "media/media.glsl"
 #include "media/view_ray.glsl"
 
@@ -33,7 +34,8 @@ void main()
   vec3 guided = vec3(0.0);
   vec3 guides = vec3(0.0);
   vec3 most = vec3(0.0);
-  vec3 here = airlight_guide_fetch(pixel).rgb;
+  vec4 guide = airlight_guide_fetch(pixel);
+  vec3 here = guide.rgb;
   ivec2 last = airlight_guide_size() - 1;
   for (int y = -2; y <= 2; y++) {
     for (int x = -2; x <= 2; x++) {
@@ -65,5 +67,5 @@ void main()
   out_direct = vec4(clamp(spread, -MOST_TIMES * most, MOST_TIMES * most), 0.0);
   // Thin fire hides nothing and still shines.
   float evenly = 1.0 / max(total, 1e-30);
-  out_emission = vec4(emission.rgb * ((opacity > 1e-3) ? share : evenly), 0.0);
+  out_emission = vec4(layers_before(pixel, guide.w) * emission.rgb * ((opacity > 1e-3) ? share : evenly), 0.0);
 }

@@ -320,6 +320,8 @@ vec3 layers_color(float limit)
   return color;
 }
 #else
+void layers_begin() {}
+
 vec3 layers_color(float limit)
 {
   return vec3(1.0);

@@ -1,5 +1,6 @@
 """What colours light that passes straight through colours its shadow: lamps of every kind, and the world."""
 
+import bpy
 import numpy as np
 import pytest
 
@@ -53,6 +54,38 @@ def test_of_lamps(stage, beside, material, kind, settings):
     pane(stage, MATERIALS[material](stage))
     stage.light(kind, **settings)
     same(beside(32, bounces=0, reference=128))
+
+
+def blocked_alone(stage, lamp):
+    """The lamp's shadows are those of what stands here alone, and of nothing else."""
+    blockers = bpy.data.collections.new("Blockers")
+    for one in stage.scene.objects:
+        if one.type == "MESH":
+            blockers.objects.link(one)
+    lamp.light_linking.blocker_collection = blockers
+    stage.rectangle((8, 8), (9, 9), 3.0, material=stage.diffuse())
+
+
+@pytest.mark.parametrize("material", ["tinted", "mixed"])
+@pytest.mark.parametrize("case", ["near", "narrow", "linked"])
+def test_of_lamps_whose_visibility_rays_tell(stage, case, material):
+    """A ball of light beside the floor, a beam narrower than a pixel, and shadow linking: as bright as through a clear
+    pane times the pane's colour."""
+    found = []
+    for made in (None, MATERIALS[material]):
+        stage.clear()
+        stage.floor()
+        stage.camera_above(0.02 if case == "narrow" else 1.0)
+        if made is not None:
+            stage.blocker((-9, -9), (9, 9), 0.3, material=made(stage))
+        size = {"near": 0.5, "narrow": 0.0, "linked": 0.05}[case]
+        beam = {"spot_size": 0.02, "spot_blend": 0.0} if case == "narrow" else {}
+        lamp = stage.light("SPOT" if beam else "POINT", (0, 0, 1.0), shadow_soft_size=size, **beam)
+        if case == "linked":
+            blocked_alone(stage, lamp)
+        found.append(stage.render(64, (16, 16))["combined"][5:11, 5:11, :3].mean((0, 1)))
+    passes = np.array(TINT[:3]) * (0.5 if material == "mixed" else 1.0)
+    assert found[1] == pytest.approx(found[0] * passes, rel=0.05)
 
 
 def test_of_the_world(stage, beside):

@@ -98,6 +98,26 @@ def test_glass_below_a_pane_shows_a_lamp_in_its_colour(stage):
     assert coloured / clear == pytest.approx(np.array(COLOR), rel=0.03)
 
 
+@pytest.mark.parametrize("samples", [1, 2])
+@pytest.mark.parametrize("node", ["ShaderNodeVolumeScatter", "ShaderNodeEmission"])
+def test_a_pane_colours_fog_up_to_its_rim_and_no_further(stage, samples, node):
+    """Pictures of few samples find light of fog at a quarter of the pixels: those on the other side of a rim count
+    without its colour. The pane is so wide that pixels beside the rim see nothing but it, or nothing of it."""
+    found = []
+    for color in ((1, 1, 1), COLOR):
+        stage.clear()
+        stage.camera((0, -2.5, 0.5), (np.pi / 2, 0, 0), angle=0.6)
+        pane = stage.material("ShaderNodeBsdfTransparent", Color=(*color, 1))
+        stage.rectangle((0, -9), (9, 9), material=pane, location=(0, -1.5, 0), turn=(np.pi / 2, 0, 0))
+        stage.light("SUN", (0, 0, 4), (0, 0, 0), energy=3.0, angle=0.0)
+        box(stage, volume(stage, node, Color=(1, 1, 1, 1)), (-1, -1, 0), (1, 1, 1))
+        passes = stage.render(samples, size=(24, 20), bounces=1)
+        found.append(passes["volume_direct" if "Scatter" in node else "emission"][4:16, :, :3])
+    share = found[1].mean(0) / found[0].mean(0)
+    assert share[8:12] == pytest.approx(np.ones((4, 3)), abs=0.02)
+    assert share[12:16] == pytest.approx(np.tile(COLOR, (4, 1)), abs=0.02)
+
+
 @pytest.mark.parametrize("samples", [1, 8])
 @pytest.mark.parametrize("panes", [1, 2])
 def test_fog_behind_a_pane_has_its_colour(stage, samples, panes):
