@@ -33,6 +33,7 @@ from ..kernels.scatter import scatter
 from ..snapshot.scene import Instance, Snapshot
 from . import box_tree
 from .box_tree import LEAF
+from .glass_sheets import NO_SHEETS, sheets_of
 from .instance_tree import MOST_BOXES, OWN_TREE, RECORD_NODES, Copies, UpperTree, is_point, kept, parted
 from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
 from .on_gpu import SceneOnGpu
@@ -46,7 +47,6 @@ from .traced_triangles import (
     mean_code,
     mean_emission,
     rays_met,
-    sheets_of,
     world_triangles,
 )
 
@@ -303,11 +303,12 @@ class HierarchyCache:
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if is_met(i, path))
         if passing:
             shown = tuple(i for i in shown if i.links.blocker not in passing)
-        sheets = sheets_of(shown, snapshot.meshes, materials)  # all together: what moves may leave another's side
+        sheets = sheets_of(shown, snapshot.meshes, materials)  # of what moves, too: it may leave another's side
         key = shown, (
             None if alike else tuple(rays_met(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            self._looks[1], maps.changes, glow.changes, tuple(origin), sheets,
+            self._looks[1], maps.changes, glow.changes, tuple(origin),
+            tuple(sheets.get(id(i)) for i in shown) if sheets else (),
         )  # fmt: skip
         look = snapshot.meshes, materials, path, maps, glow, sheets
         trees = self._kept.get(key)
@@ -330,23 +331,22 @@ class HierarchyCache:
         """New trees, but for those of meshes that stand."""
         meshes, materials, path, maps, glow, sheets = look
         some = [one for one in shown if meshes[one.mesh].triangle_count]
-        expanded, kinds = parted(
-            some, meshes,
-            lambda one: (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), links_code(one)), LARGEST,
-        )  # fmt: skip
+
+        def met(one: Instance) -> tuple:
+            return rays_met(one, path), links_code(one), sheets.get(id(one))
+
+        expanded, kinds = parted(some, meshes, lambda one: (*maps.kind_of(one), glow.kind_of(one), *met(one)), LARGEST)
         in_trees = (*expanded, *(some[own[0]] for own in kinds.values()))
         if sum(meshes[one.mesh].triangle_count for one in in_trees) > LARGEST:
             # What opacity and emission tell apart between instances would be too many trees: all have the first one's.
-            expanded, kinds = parted(
-                some, meshes, lambda one: (one.mesh, one.materials, rays_met(one, path), links_code(one)), LARGEST
-            )
+            expanded, kinds = parted(some, meshes, lambda one: (one.mesh, one.materials, *met(one)), LARGEST)
         number = {id(one): k for k, one in enumerate(shown)} if kinds else {}
         copies, used = [], {}
         for kind, own in kinds.items():
             first = some[own[0]]
             slots = {*first.materials, 0}  # faces without a material have the first one
             looks = tuple(self._looks[1][slot] for slot in sorted(slots) if slot < len(self._looks[1]))
-            named = (kind, meshes[first.mesh].version, looks, *rest[3:5], sheets)
+            named = (kind, meshes[first.mesh].version, looks, *rest[3:5])
             tree = used[named] = self._meshes.get(named) or _tree_of_mesh(first, look)
             if tree.triangles:
                 own = [some[k] for k in own]
@@ -408,7 +408,8 @@ def _tree_of_mesh(instance: Instance, look: tuple) -> Tree:
     """The tree of a mesh in its own space, as an instance shows it."""
     meshes, materials, path, maps, glow, sheets = look
     resting = replace(instance, matrix=np.eye(4))
-    tree = Tree(*world_triangles([resting], meshes, materials, np.zeros(3), path, maps, glow, sheets))
+    own = {id(resting): sheets[id(instance)]} if id(instance) in sheets else NO_SHEETS
+    tree = Tree(*world_triangles([resting], meshes, materials, np.zeros(3), path, maps, glow, own))
     tree.low = tree.high = None  # it will not move
     return tree
 

@@ -9,7 +9,6 @@ Cost: numpy over all triangles of all instances, some 0.3 us each.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import groupby
 
 import numpy as np
@@ -17,17 +16,14 @@ import numpy as np
 from ..materials.compiled import CompiledMaterial
 from ..materials.energy import pane_passing
 from ..snapshot.scene import LAST_GROUP, Instance, Mesh
-from .culling import closed_triangles
 from .emission_maps import EmissionMaps, TriangleEmission
+from .glass_sheets import ALONE, NO_SHEETS, Sheets, open_parts
 from .opacity_maps import OpacityMaps, TriangleOpacity
 
 AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
 # Which rays a triangle stops: all, all but those to lights, those alone, all and those to lights for certain.
 ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
-ALONE = 0.99  # share of a material, from which on it is glass and nothing else
-ONE_SIDED = 0.25  # length of the sum of a sheet's faces, over their area
 SHEET = WHOLE_SHADOW  # of glass, which stops none for certain: all rays, by the side that they meet
-MOST_KEPT = 64  # meshes of which is kept what is open
 MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
 FRONT_ALONE = 0.25  # added to the material's number
 TINT_CODE = 1000.0  # taken from minus the colour of what passes, in the place of what is emitted
@@ -46,12 +42,12 @@ def world_triangles(
     path: str,
     maps: OpacityMaps,
     glow: EmissionMaps,
-    sheets: frozenset[int] = frozenset(),
+    sheets: Sheets = NO_SHEETS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) float32 opacity (_codes), mean emitted radiance, number of the
-    material (with the side that emits, mean_emission) and packed corner normals. `sheets`: what `sheets_of` says of all
-    instances together."""
+    material (with the side that emits, mean_emission) and packed corner normals. `sheets`: see
+    glass_sheets.py."""
     look = {
         (rays, mirrored): np.array([
             (mean_code(m, rays), *radiance, k + side)
@@ -69,10 +65,11 @@ def world_triangles(
     turns = np.linalg.det(matrices_of_all[:, :, :3])
     cofactors_of_all, first_of_kind = _cofactors(matrices_of_all[:, :, :3]), 0
     kinds = zip(shown, (
-        (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), links_code(one), turn < 0.0)
+        (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), links_code(one), turn < 0.0,
+         sheets.get(id(one), frozenset()))
         for one, turn in zip(shown, turns)
     ))  # fmt: skip
-    for (key, slots, _, _, rays, links, mirrored), group in groupby(kinds, lambda pair: pair[1]):
+    for (key, slots, _, _, rays, links, mirrored, single), group in groupby(kinds, lambda pair: pair[1]):
         mesh = meshes[key]
         of_triangle = mesh.triangle_materials(slots)
         look_of_triangle = look[rays, bool(mirrored)][of_triangle]
@@ -80,8 +77,8 @@ def world_triangles(
         known = maps.of(copies[0])
         if known is not None:
             _refine(look_of_triangle, of_triangle, materials, known, rays, bool(mirrored))
-        if rays == ALL_RAYS and not sheets.isdisjoint(slots):
-            _let_leave(look_of_triangle, of_triangle, materials, sheets, mesh, bool(mirrored))
+        if rays == ALL_RAYS and single:
+            _let_leave(look_of_triangle, of_triangle, materials, single, mesh, bool(mirrored))
         shining = glow.of(copies[0])
         if shining is not None:
             _shine(look_of_triangle, of_triangle, shining, bool(mirrored))
@@ -184,52 +181,21 @@ def _refine(
             look[own, 0] = _codes(stopped, sides, mirrored, glass, known.tile[own])
 
 
-def sheets_of(shown: Iterable[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]) -> frozenset[int]:
-    """Materials of glass of which one side is the inside of no solid, as that of a pool's surface. Two sheets that face
-    away from each other are a pane, whose light enters by one and leaves by the other: all open glass together must
-    face one way more than others."""
-    glass = {k for k, one in enumerate(materials) if one.glass is not None and one.glass.share > ALONE}
-    facing, area, found = np.zeros(3), 0.0, set()
-    for one in shown if glass else ():
-        if glass.isdisjoint(one.materials) or not meshes[one.mesh].triangle_count:
-            continue
-        mesh = meshes[one.mesh]
-        of_triangle = mesh.triangle_materials(one.materials)
-        own = _open_triangles(mesh) & np.isin(of_triangle, [*glass])
-        if own.any():
-            corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[own]]] @ one.matrix[:3, :3].T
-            across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            facing += across.sum(axis=0)
-            area += np.linalg.norm(across, axis=1).sum()
-            found.update(of_triangle[own].tolist())
-    return frozenset(found if np.linalg.norm(facing) > ONE_SIDED * area else ())
-
-
-_open: dict[tuple, np.ndarray] = {}  # by what tells a mesh's content
-
-
-def _open_triangles(mesh: Mesh) -> np.ndarray:
-    """(T,) which triangles belong to no closed part of the mesh."""
-    key = (mesh.key, mesh.version, mesh.triangle_count, mesh.bounds_min.tobytes(), mesh.bounds_max.tobytes())
-    if key not in _open:
-        if len(_open) >= MOST_KEPT:
-            _open.clear()
-        _open[key] = ~closed_triangles(mesh)
-    return _open[key]
-
-
 def _let_leave(
-    look: np.ndarray, of_triangle: np.ndarray, materials: list[CompiledMaterial], sheets: frozenset[int], mesh: Mesh,
+    look: np.ndarray, of_triangle: np.ndarray, materials: list[CompiledMaterial], single: frozenset[int], mesh: Mesh,
     mirrored: bool,
 ) -> None:  # fmt: skip
-    """Of open glass of `sheets` let pass from within what is left of even light there: it has spread over n2 as many
-    directions, and total reflection keeps the rest."""
+    """Of the parts `single` of a mesh let pass from within what is left of even light there: it has spread over n2 as
+    many directions, and total reflection keeps the rest."""
     size = SIDE_STEPS + 1
-    is_open = _open_triangles(mesh) & (np.abs(look[:, 0]) < MAPPED * size**2)
-    for number in sheets:
-        own = np.flatnonzero(is_open & (of_triangle == number))
+    of_sheet = np.isin(open_parts(mesh), [*single]) & (np.abs(look[:, 0]) < MAPPED * size**2)
+    for number in np.unique(of_triangle[of_sheet]):
+        glass = materials[number].glass
+        if glass is None or glass.share <= ALONE:
+            continue
+        own = np.flatnonzero(of_sheet & (of_triangle == number))
         passing = 1.0 - np.abs(look[own, 0]) % size / SIDE_STEPS  # of even light, the second side
-        leaving = passing / max(materials[number].glass.ior, 1.0) ** 2
+        leaving = passing / max(glass.ior, 1.0) ** 2
         look[own, 0] = -_codes(SHEET, 1.0 - np.stack([passing, leaving], axis=-1), mirrored, False)
 
 

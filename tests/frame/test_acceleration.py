@@ -102,16 +102,16 @@ def test_copy_that_grows_from_a_point_is_met(gpu_context, monkeypatch, before):
 
 
 @pytest.mark.parametrize("own_tree", [1, 1000])
-def test_whether_glass_is_a_sheet_all_of_it_says_together(gpu_context, monkeypatch, own_tree):
-    """Two open faces that look apart are a pane, also while one of them moves, or in a tree of their own; once one of
-    them is turned, both are sheets."""
+def test_open_glass_is_a_sheet_unless_another_face_lies_behind_it(gpu_context, monkeypatch, own_tree):
+    """Two open faces that look apart, one behind the other, are a pane, also while one of them moves, or in a tree of
+    their own; once one of them is turned, or moved aside, both are sheets."""
     monkeypatch.setattr(instance_tree, "OWN_TREE", own_tree)
     glass = graph(
         node("Glass", "ShaderNodeBsdfGlass", {"BSDF": "SHADER"}, Color=(1, 1, 1, 1), Roughness=0.0, IOR=1.5),
         surface=("Glass", "BSDF"),
     )
     whole = room()
-    opaque, away = replace(whole.instances[0], materials=(1,)), np.diag([1, -1, -1, 1.0])
+    opaque, away = replace(whole.instances[0], materials=(1,)), np.diag([1, 1, -1, 1.0])[[1, 0, 2, 3]]
     clear, mesh = Material("glass", "glass", glass), whole.meshes["mesh"]
     flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     whole = replace(
@@ -119,18 +119,19 @@ def test_whether_glass_is_a_sheet_all_of_it_says_together(gpu_context, monkeypat
         meshes={"mesh": replace(mesh, positions=flat), "wall": replace(mesh, key="wall")},
     )  # fmt: skip
 
-    def with_second(matrix, height):
+    def with_second(matrix, height, aside=0.0):
         matrix = matrix.copy()
-        matrix[2, 3] = height
+        matrix[0, 3], matrix[2, 3] = aside, height
         two = whole.instances[0], replace(whole.instances[0], matrix=matrix)
         rest = tuple(replace(opaque, mesh="wall") for _ in range(8))
         return seen_by(replace(whole, instances=(*two, *rest)))
 
-    def is_sheet(cache, matrix, height):
-        return ("GLASS_SHEETS", "1") in cache.get(with_second(matrix, height), "glossy").leaves.defines
+    def is_sheet(cache, *placed):
+        return ("GLASS_SHEETS", "1") in cache.get(with_second(*placed), "glossy").leaves.defines
 
     cache = HierarchyCache()
     assert not is_sheet(cache, away, -0.1)
     assert not is_sheet(cache, away, -0.2)  # a draft moves what has moved alone
     assert is_sheet(cache, np.eye(4), -0.2)
     assert not is_sheet(cache, away, -0.2)
+    assert is_sheet(cache, away, -0.2, 5.0)
