@@ -15,10 +15,11 @@ Of lamps that light linking keeps from all casters nothing is bent or mirrored.
 Where all casters are closed convex meshes that only mirror, and no lamp stands among them, their light never
 converges (`spreads`): few photons have all of it.
 
-Blender's switches: with Reflective or Refractive caustics off (Cycles' Light Paths), reflected or refracted light is
-left out, but for glass with Shadow Caustics: objects set to cast them, under lights set to give them. Where the Cycles
-add-on is off, the switches do not exist and all is on. Whether an object is to receive such caustics is not followed:
-all surfaces do.
+Blender's switches (Cycles' Light Paths) are about what diffuse surfaces see: with Reflective or Refractive caustics off
+they do without the light that the last surface on its way mirrors or lets pass, but for glass with Shadow Caustics:
+objects set to cast them, under lights set to give them. Glass stops light all the same, and gloss sees all of it. Where
+the Cycles add-on is off, the switches do not exist and all is on. Whether an object is to receive such caustics is not
+followed: all surfaces do.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from ..materials.graph import Graph
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from ..sources import lights
 from ..sources.bright_world import BrightPart, bright_part
-from .light_views import groups
+from .light_views import REFLECTED, REFRACTED, groups
 
 SLOT = "caustics"
 MESHES, WORLD = "emissive meshes", "the world"  # keys beside those of lamps, which are none of these
@@ -63,7 +64,8 @@ class Casters:
     low: np.ndarray  # (K, 3) world space
     high: np.ndarray
     lights: frozenset[str]  # keys of the lights that are answered for
-    bent: frozenset[str]  # of those whose refracted light is wanted, too
+    bent: frozenset[str]  # of those whose refracted light is wanted on diffuse surfaces
+    mirrored: bool  # whether reflected light is
     spreads: bool = False  # nothing here makes light converge
     dark: frozenset[str] = frozenset()  # keys of lamps that, by light linking, light no caster
 
@@ -71,11 +73,16 @@ class Casters:
     def materials(self) -> frozenset[int]:
         return self.refracting | frozenset(self.mirrors)
 
+    def wanted(self, key: str) -> int:
+        """REFRACTED and REFLECTED, a sum, of what diffuse surfaces are to have of a light."""
+        return REFRACTED * (key in self.bent) + REFLECTED * self.mirrored
+
 
 def casters_of(snapshot: Snapshot) -> Casters | str:
     """The casters, or, as a sentence, why there are none."""
     film = snapshot.film
     glass, mirrors = set(), {}
+    by_flags = not film.caustics_refractive
     for number in snapshot.used_materials:
         graph = snapshot.materials[number].graph
         if may_refract(graph):
@@ -83,39 +90,42 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
         rough = mirror_roughness(graph)
         if rough is not None and film.caustics_reflective:
             mirrors[number] = rough
-    by_flags = not film.caustics_refractive
-    if by_flags and not any(one.caustics_caster for one in snapshot.instances):
-        glass = set()
     if not glass and not mirrors:
         if film.caustics_reflective and film.caustics_refractive:
             return "no material is glass or a smooth mirror"
-        return "caustics are switched off in the scene's Light Paths, or nothing else throws any"
+        return "caustics are switched off in the scene's Light Paths, and no material is glass"
     shown = [
         one
         for one in snapshot.instances
         if one.visibility.diffuse and snapshot.meshes[one.mesh].triangle_count and np.isfinite(one.matrix).all()
         if not glass.union(mirrors).isdisjoint(one.materials)
     ]
-    if by_flags:
+    flagged = by_flags and any(one.caustics_caster for one in shown)
+    if flagged:
         shown = [one for one in shown if one.caustics_caster or not set(mirrors).isdisjoint(one.materials)]
     if not shown:
         return "no object that throws caustics is visible to light from surfaces"
-    if not mirrors and all(_is_pane(snapshot.meshes[mesh]) for mesh in {one.mesh for one in shown}):
+    if (
+        film.caustics_refractive
+        and not mirrors
+        and all(_is_pane(snapshot.meshes[mesh]) for mesh in {one.mesh for one in shown})
+    ):
         return "all glass is flat panes, which light passes straight"
-    given = [light for light in snapshot.lights if light.cast_shadow and np.any(light.strength)]
-    given = [light for light in given if light.visibility.diffuse and (light.caustics or not by_flags or mirrors)]
-    others = () if by_flags else _other_sources(snapshot, glass, mirrors)
+    lamps = (light for light in snapshot.lights if light.cast_shadow and light.visibility.diffuse)
+    given = [light for light in lamps if np.any(light.strength)]
+    others = _other_sources(snapshot, glass, mirrors)
     if not given and not others:
         return "no lamp that casts shadows, no emissive mesh and no bright part of the world lights them"
     boxes = np.array([_box(one, snapshot.meshes[one.mesh]) for one in shown])
     low, high = groups(*grown(boxes[:, 0], boxes[:, 1]))
     keys = frozenset(light.key for light in given).union(others)
-    bent = frozenset(light.key for light in given if light.caustics) if by_flags else keys
+    bent = frozenset(light.key for light in given if light.caustics and flagged) if by_flags else keys
     # Light that a lamp does not send to any caster throws none, and glass still stops it.
     receivers = {one.links.receiver for one in shown}
     dark = frozenset(light.key for light in given if receivers <= set(light.links.unlit))
     spreads = not glass and _only_spread(snapshot, shown, mirrors, given, boxes)
-    return Casters(frozenset(glass), mirrors, low, high, keys, bent, spreads, dark)
+    reflective = film.caustics_reflective
+    return Casters(frozenset(glass), mirrors, low, high, keys, bent, reflective, spreads, dark)
 
 
 def _other_sources(snapshot: Snapshot, glass: set[int], mirrors: dict[int, float]) -> tuple[str, ...]:

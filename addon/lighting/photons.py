@@ -87,7 +87,9 @@ def photons_program(patterned: bool) -> Program:
             *(("RGBA32F", name) for name in ("energy_table", "reflectance", "interface_table", *behind)),
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
-        constants=(("FLOAT", "offset_size"), ("INT", "photon_roll"), ("INT", "photon_gloss")),
+        constants=(
+            ("FLOAT", "offset_size"), ("INT", "photon_roll"), ("INT", "photon_gloss"), ("INT", "photon_diffuse"),
+        ),
         defines=(("PATTERNED", ""),) if patterned else (),
         outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
     )  # fmt: skip
@@ -103,14 +105,28 @@ LOOKUPS = passes.fullscreen_program(
     blocks=((VIEW, "film_view"), (VIEW, "map_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
     outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
 )
-FOOTPRINTS = passes.fullscreen_program(
-    "photon footprints",
-    "caustics/footprint.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in FOUND),
-    blocks=((VIEW, "film_view"),),
-    constants=(("FLOAT", "widening"), ("FLOAT", "least_pixels"), ("FLOAT", "longest")),
-    outputs=(("VEC4", "out_centre"), ("VEC4", "out_first"), ("VEC4", "out_second"), ("VEC4", "out_value")),
-)
+
+
+@cache
+def footprints_program(walls: bool) -> Program:
+    """Records of photons. `walls`: they end at what stands on their surface, which rays look for."""
+    return passes.fullscreen_program(
+        "photon footprints",
+        "caustics/footprint.frag.glsl",
+        textures=(
+            *(("RGBA32F", name) for name in FOUND), *(acceleration.HIERARCHY_TEXTURES if walls else ()),
+        ),
+        blocks=((VIEW, "film_view"),),
+        constants=(
+            ("FLOAT", "widening"), ("FLOAT", "least_pixels"), ("FLOAT", "longest"),
+            *((("FLOAT", "offset_size"),) if walls else ()),
+        ),
+        defines=(("WALLS", ""),) if walls else (),
+        outputs=(("VEC4", "out_centre"), ("VEC4", "out_first"), ("VEC4", "out_second"), ("VEC4", "out_value")),
+    )  # fmt: skip
+
+
+FOOTPRINTS, WALLED = footprints_program(False), footprints_program(True)
 # Of footprints beside the way to the neighbours, and the exponent of their fall with samples. A grid's longest waves
 # have amplitudes of 48 J3(q) / q^3, q = 2 pi times the widening. The first zero of J3 has none: few samples have that.
 WIDENING, FALL, WIDENING_FEW = 1.443, -1.0 / 5.0, 1.0154
@@ -151,6 +167,7 @@ class Bundle:
     found: tuple[images.Image, ...]
     side: int
     count: int  # of samples that share the light
+    traced: bool  # not by look-ups
 
 
 def _points(emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]], count: int) -> int:
@@ -252,7 +269,7 @@ class Photons:
         """Views of the lights whose turn it is in this sample, `side` photons along each side; `fitted`: at most that
         many, by what shows (photon_grids.py). `turn`: how many samples had photons before, and how many have in all,
         where not all samples do and whoever asks weighs them."""
-        reflected = (REFLECTED,) if frame.snapshot.film.caustics_reflective else ()
+        on_gloss = frame.shared(caustic_casters.Answered).on_gloss
         alone = frame.settings.schedule.known_total and frame.settings.samples == 1
         whole = frame.settings.schedule.known_total
         boxes = list(caustic_casters.boxes_of(frame, casters))
@@ -264,8 +281,12 @@ class Photons:
             key = caustic_casters.key_of(emitter)
             if key in casters.dark:
                 continue
-            bends = casters.refracting and key in casters.bent
-            lobes = ((REFRACTED,) if bends else ()) + reflected
+            wanted = casters.wanted(key)
+            wanted |= (REFRACTED | REFLECTED) * (on_gloss and key != caustic_casters.MESHES)
+            possible = (REFRACTED, REFLECTED) if casters.refracting else (REFLECTED,)
+            lobes = tuple(lobe for lobe in possible if wanted & lobe)
+            if not lobes:
+                continue
             sharing, of_turns = count, 0
             if turn is not None and count > 1:
                 # Sample 0 has its photons before it is known how many others do: those are a set without it.
@@ -355,10 +376,11 @@ class Photons:
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},
                 constants={
-                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": on_gloss
+                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": on_gloss,
+                    "photon_diffuse": casters.wanted(caustic_casters.key_of(light.emitter)),
                 },
             )  # fmt: skip
-            yield self._bundle(frame, technique, target, light)
+            yield self._bundle(frame, technique, target, light, True)
 
     def looked_up(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, map_block: Block,
@@ -376,7 +398,7 @@ class Photons:
                 textures=textures,
                 blocks={"film_view": block, "map_view": map_block, **bound["blocks"]},
             )  # fmt: skip
-            yield self._bundle(frame, technique, target, light)
+            yield self._bundle(frame, technique, target, light, False)
 
     def _drawn(self, frame, technique, casters, light: LitView, interfaces: int):
         """Draws the casters' nearest surfaces by each lobe, and yields what programs that find photons bind."""
@@ -419,25 +441,30 @@ class Photons:
             textures = {**surfaces, "energy_table": frame.materials.energy_table}
             yield block, {"textures": textures, "blocks": {"sources": sources, "photon_light": self._emission}}
 
-    def _bundle(self, frame: Frame, technique: Technique, target: images.Target, light: LitView) -> Bundle:
+    def _bundle(
+        self, frame: Frame, technique: Technique, target: images.Target, light: LitView, traced: bool
+    ) -> Bundle:
         frame.count(technique, "passes")
         frame.count(technique, "photons", target.size[0] ** 2)
-        return Bundle(target.colors, target.size[0], light.count)
+        return Bundle(target.colors, target.size[0], light.count, traced)
 
     def footprints(
         self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, least_pixels: float
     ) -> tuple[images.Image, ...]:
         """Records of kernels/splats.py for a bundle, at least `least_pixels` pixels of the view `onto` wide."""
         target = self._target("_footprints", bundle.side, 4)
+        textures = dict(zip(FOUND, bundle.found))
+        constants = {"widening": widening(bundle.count), "least_pixels": least_pixels, "longest": LONGEST}
+        if bundle.traced:
+            textures |= frame.hierarchy("transmission").textures
+            constants["offset_size"] = 1e-6 * frame.geometry.size
         passes.fullscreen(
-            FOOTPRINTS,
+            footprints_program(bundle.traced),
             target,
-            textures=dict(zip(FOUND, bundle.found)),
+            textures=textures,
             blocks={"film_view": onto},
-            constants={
-                "widening": widening(bundle.count), "least_pixels": least_pixels, "longest": LONGEST,
-            },
-        )  # fmt: skip
+            constants=constants,
+        )
         frame.count(technique, "passes")
         return target.colors
 

@@ -106,8 +106,9 @@ class CausticsMapping(Technique):
         return acceleration.too_many(snapshot) if settings.get(self, "by") == RAYS else None
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        found = photons.PHOTONS if settings.get(self, "by") == RAYS else photons.LOOKUPS
-        return found, photons.FOOTPRINTS, INTO_MAP, APPLY
+        if settings.get(self, "by") == RAYS:
+            return photons.PHOTONS, photons.WALLED, INTO_MAP, APPLY
+        return photons.LOOKUPS, photons.FOOTPRINTS, INTO_MAP, APPLY
 
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)

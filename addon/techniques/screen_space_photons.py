@@ -46,7 +46,7 @@ from ..lighting.caustic_maps import SEEN, CausticMaps
 from ..lighting.kept_apart import KeptApart
 from ..lighting.light_views import REFLECTED, REFRACTED
 from ..lighting.path_sources import ShadedLobes
-from ..lighting.photons import FOOTPRINTS, PHOTONS, SPREAD_SIDE, LitView, Photons
+from ..lighting.photons import PHOTONS, SPREAD_SIDE, WALLED, LitView, Photons
 from ..materials import gloss
 from ..scene import acceleration
 from ..scene.materials import may_be_glossy
@@ -118,7 +118,7 @@ class ScreenSpacePhotons(Technique):
         return True
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return PHOTONS, FOOTPRINTS, splat_program(_on_gloss(snapshot, caustic_casters.casters_of(snapshot)))
+        return PHOTONS, WALLED, splat_program(_on_gloss(snapshot, caustic_casters.casters_of(snapshot)))
 
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)
@@ -189,12 +189,9 @@ class ScreenSpacePhotons(Technique):
 
 
 def _on_gloss(snapshot: Snapshot, casters: caustic_casters.Casters | str) -> bool:
-    """Whether glossy lobes may take photons: both kinds of caustics are on. None end on mirrors or glass, even where
-    those have a rough lobe, too."""
-    film = snapshot.film
+    """Whether glossy lobes may take photons, whatever caustics diffuse surfaces are to have. None end on mirrors or
+    glass, even where those have a rough lobe, too."""
     if isinstance(casters, str) or not casters.refracting:
-        return False
-    if not (film.caustics_refractive and film.caustics_reflective):
         return False
     rough = [*(max(gloss.mirrors(snapshot.materials[k].graph)) for k in casters.mirrors)]
     rough += [max(gloss.glass(snapshot.materials[k].graph), default=1.0) for k in casters.refracting]

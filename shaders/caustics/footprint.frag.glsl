@@ -1,8 +1,66 @@
 // Footprints of photons: the ellipse that a photon's neighbours on the grid span about it (addon/lighting/photons.py), as
-// records of addon/kernels/splats.py, with 1 and where it came from in w of the centre, or .5 if glossy lobes do not take it.
+// records of addon/kernels/splats.py, with 1 and where it came from in w of the centre, or .5 if glossy lobes do not take it;
+// below 0 if they alone do.
+// w of the others: the wall that the footprint ends at (wall_in), by direction and distance in the ellipse; beyond it: none.
 // `film_view`: the view into which they will be drawn.
+//
+// WALLS: around photons of which others within the footprint end on other surfaces, rays along theirs look for walls.
 #include "ask/view.glsl"
 #include "lib/math.glsl"
+#define NO_WALL vec3(1.0, 0.0, 2.0)
+#ifdef WALLS
+#define OPAQUE_ONLY
+#include "trace/rays.glsl"
+
+#define WALL_RAYS 8
+#define LIFT 0.02     // of the shorter half axis, by which they run above the surface
+#define MOST_APART 16.0  // texels, of a photon whose end says whether there may be walls within a wide footprint
+#define UPRIGHT 0.7   // cosine to the surface's normal up to which what they meet is no part of it
+
+// The nearest wall within an ellipse, in the plane where its half axes are 1: unit direction, and distance as z.
+vec3 wall_in(vec3 centre, vec3 normal, vec3 first, vec3 second)
+{
+  vec3 wall = NO_WALL;
+  vec3 origin = centre + normal * (ray_offset(centre) + LIFT * length(second));
+  for (int k = 0; k < WALL_RAYS; k++) {
+    float angle = 2.0 * PI * (float(k) + 0.5) / float(WALL_RAYS);
+    vec3 way = cos(angle) * first + sin(angle) * second;
+    float reach = length(way);
+    ivec2 hit;
+    float t = trace_until(origin, way / max(reach, 1e-30), reach, 0.0, 0u, hit);
+    if (t < reach) {
+      vec3 facing = triangle_normal(hit);
+      vec2 across = vec2(dot(facing, first), dot(facing, second));
+      float off = dot(facing, way) * t / reach;
+      float size = length(across);
+      bool upright = abs(dot(facing, normal)) < UPRIGHT && size > 0.0;
+      if (upright && abs(off) < wall.z * size) {
+        wall = vec3((off < 0.0 ? -across : across) / size, abs(off) / size);
+      }
+    }
+  }
+  return wall;
+}
+#endif
+
+bool is_alike(ivec2 other, float path, vec3 normal)
+{
+  return photon_points_fetch(other).w == path && dot(octahedral_decode(photon_normals_fetch(other).xy), normal) > 0.7;
+}
+
+#ifdef WALLS
+// Whether one of the photons `apart` texels away ends on another surface.
+bool is_torn(ivec2 texel, int apart, float path, vec3 normal)
+{
+  ivec2 last = photon_points_size() - 1;
+  bool torn = false;
+  for (int k = 0; k < 9; k++) {
+    ivec2 other = clamp(texel + apart * (ivec2(k % 3, k / 3) - 1), ivec2(0), last);
+    torn = torn || (photon_points_fetch(other).w > 0.0 && !is_alike(other, path, normal));
+  }
+  return torn;
+}
+#endif
 
 // Adds the ways to two neighbours along one axis of the grid to the ellipse; false where neither is of the same bundle.
 bool add_neighbours(ivec2 texel, ivec2 step, vec3 centre, float path, vec3 normal, float spacing, vec3 tangent,
@@ -18,9 +76,8 @@ bool add_neighbours(ivec2 texel, ivec2 step, vec3 centre, float path, vec3 norma
     }
     vec4 there = photon_points_fetch(other);
     vec3 way = there.xyz - centre;
-    bool alike = there.w == path && dot(octahedral_decode(photon_normals_fetch(other).xy), normal) > 0.7;
     float reach = length(way);
-    if (alike && reach < longest * spacing) {
+    if (is_alike(other, path, normal) && reach < longest * spacing) {
       // On a curved receiver the way is as long as it is, not as the tangent plane shows it.
       vec2 flat_way = vec2(dot(way, tangent), dot(way, bitangent));
       flat_way *= reach / max(length(flat_way), 1e-30);
@@ -54,6 +111,7 @@ void main()
   bool along_y = add_neighbours(texel, ivec2(0, 1), point.xyz, point.w, normal, flux.w, tangent, bitangent, ellipse);
   float alone = float(!along_x) + float(!along_y);
   ellipse += vec3(1.0, 0.0, 1.0) * (0.5 * alone * flux.w * flux.w);
+  float apart = 0.5 * (ellipse.x + ellipse.z);  // of neighbours, squared
   ellipse *= widening * widening;
   float pixel = view_pixel() * view_growth_ahead(point.xyz);
   // The biweight kernel of radius h has the variance h^2 / 8, a disc of radius r r^2 / 4.
@@ -62,14 +120,23 @@ void main()
 
   // Half axes: the roots of the ellipse's eigenvalues along its eigenvectors.
   float middle = 0.5 * (ellipse.x + ellipse.z);
-  float apart = sqrt(max(0.25 * (ellipse.x - ellipse.z) * (ellipse.x - ellipse.z) + ellipse.y * ellipse.y, 0.0));
-  float larger = middle + apart;
+  float half_gap = sqrt(max(0.25 * (ellipse.x - ellipse.z) * (ellipse.x - ellipse.z) + ellipse.y * ellipse.y, 0.0));
+  float larger = middle + half_gap;
   float smaller = max((ellipse.x * ellipse.z - ellipse.y * ellipse.y) / max(larger, 1e-37), 1e-6 * larger);
   vec2 main_axis = (abs(ellipse.y) > 1e-6 * larger) ? normalize(vec2(larger - ellipse.z, ellipse.y))
                  : ((ellipse.x >= ellipse.z) ? vec2(1.0, 0.0) : vec2(0.0, 1.0));
   vec3 first = main_axis.x * tangent + main_axis.y * bitangent;
-  out_centre = vec4(point.xyz, (facing.z < 0.0) ? 0.5 : 1.0 + facing.z);
-  out_first = vec4(first * sqrt(larger), normal.x);
-  out_second = vec4(cross(normal, first) * sqrt(smaller), normal.y);
-  out_value = vec4(flux.rgb, normal.z);
+  first *= sqrt(larger);
+  vec3 second = cross(normal, normalize(first)) * sqrt(smaller);
+  vec3 wall = NO_WALL;
+#ifdef WALLS
+  int steps = int(clamp(sqrt(larger / max(apart, 1e-37)), 1.0, MOST_APART));
+  if (is_torn(texel, 1, point.w, normal) || is_torn(texel, steps, point.w, normal)) {
+    wall = wall_in(point.xyz, normal, first, second);
+  }
+#endif
+  out_centre = vec4(point.xyz, (facing.z == -0.5) ? 0.5 : ((facing.z < 0.0) ? facing.z : 1.0 + facing.z));
+  out_first = vec4(first, wall.x);
+  out_second = vec4(second, wall.y);
+  out_value = vec4(flux.rgb, wall.z);
 }

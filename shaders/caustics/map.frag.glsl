@@ -7,7 +7,7 @@ void main()
   ivec2 texel = ivec2(gl_FragCoord.xy);
   vec4 place = receiver_position_fetch(texel);
   out_irradiance = vec4(0.0);
-  if (place.w == 0.0) {
+  if (place.w == 0.0 || splat_centre.w < 0.0) {  // nothing there, or a photon for glossy lobes alone
     discard;
   }
   vec3 normal = octahedral_decode(receiver_normal_fetch(texel).zw);

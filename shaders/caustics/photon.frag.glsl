@@ -5,7 +5,8 @@
 //
 //   point   xyz where the photon ends; w: its path and the material there as a number above 0; 0: none
 //   normal  xy of the triangle, octahedral, towards the photon; z: where the photon came from (pack_normal), if glossy lobes
-//           take it, too (caustics/gloss.glsl), else -1; w: blur that light and lobes leave to it, m
+//           take it, too (caustics/gloss.glsl), less than minus that by 1 if they alone do, -.5 if they do not; w: blur that
+//           light and lobes leave to it, m
 //   flux    rgb, W; w: how far neighbours would be if nothing had bent them, m
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
@@ -143,7 +144,8 @@ void main()
   }
   bool passes = bends;
   // Smooth glass next to the light, then glass alone, which mirrors from within or is smooth; `photon_gloss`: 1 where gloss
-  // sees the light through glass, 2 where it sees it mirrored.
+  // sees the light through glass, 2 where it sees it mirrored; `photon_diffuse`: 1 and 2 the same of what diffuse surfaces
+  // see, by the last interface, which is the one next to them.
   bool clear = (photon_gloss & (bends ? 1 : 2)) != 0 && lobe_spread == 0.0 && (bends || surface_is_mirror_of_glass(s));
   if (passes != (dot(onward, geometric_normal) < 0.0)) {
     return;
@@ -195,10 +197,15 @@ void main()
 #endif
     if (!is_glass && !mirrors) {
       // The end.
+      bool to_diffuse = (photon_diffuse & (passes ? 1 : 2)) != 0;
+      if (!to_diffuse && !clear) {
+        return;
+      }
       float lobes = photon_light.spread.y * photon_light.spread.y * blur_squared;
+      float came = clear ? pack_normal(-onward) : -0.5;
       out_point = vec4(position, 1.0 + mod(path * 37.0 + float(material), PATHS));
       vec2 facing = octahedral_encode((dot(normal, onward) > 0.0) ? -normal : normal);
-      out_normal = vec4(facing, clear ? pack_normal(-onward) : -1.0, sqrt(apart * apart + lobes));
+      out_normal = vec4(facing, to_diffuse ? came : -1.0 - came, sqrt(apart * apart + lobes));
       out_flux = vec4(flux, width * (parallel ? 1.0 : (away + travelled) / away));
       return;
     }

@@ -33,11 +33,12 @@ void main()
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
   float width = view_pixel() * view_growth_ahead(place.xyz);
   vec3 arriving = photon_irradiance(place.xyz, normal, 0.05 * width);
-  out_light = vec4(arriving * surface_diffuse_fetch(pixel).rgb / PI, 0.0);
+  out_light = (splat_centre.w > 0.0) ? vec4(arriving * surface_diffuse_fetch(pixel).rgb / PI, 0.0) : vec4(0.0);
 #ifdef GLOSS
-  bool lit = max_component(arriving) > 0.0 && splat_centre.w >= 1.0;
+  float came = abs(splat_centre.w) - 1.0;
+  bool lit = max_component(arriving) > 0.0 && came >= 0.0;
   if (lit && max_component(surface_tint_fetch(pixel).rgb) > 0.0) {
-    out_gloss = vec4(arriving * gloss_of(pixel, unpack_normal(splat_centre.w - 1.0)), 0.0);
+    out_gloss = vec4(arriving * gloss_of(pixel, unpack_normal(came)), 0.0);
   }
 #endif
 }

@@ -666,15 +666,36 @@ def test_scenes_without_casters_lamps_or_room_for_them_say_so(stage):
     )
     assert "flat panes" in reason(stage)
     stage.remove(pane)
-    ball(stage, glass(stage))
+    made = ball(stage, glass(stage))
     lamp.data.use_shadow = False
     assert "no lamp that casts shadows" in reason(stage)
     lamp.data.use_shadow = True
+    stage.remove(made)
+    ball(stage, stage.material("ShaderNodeBsdfGlossy", Roughness=0.0))
     stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = False
     try:
         assert "switched off" in reason(stage)
     finally:
         stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = True
+
+
+@pytest.mark.parametrize("samples", [1, 8])
+def test_photons_stay_on_their_side_of_a_wall(stage, samples):
+    """A wall without thickness beside a ball of glass: the floor behind it stays dark, and no light is lost."""
+    found = []
+    for wall in (True, False):
+        stage.clear()
+        stage.floor()
+        ball(stage, glass(stage), radius=0.3, place=(-0.45, 0, 0.7))
+        if wall:
+            black = stage.diffuse(0.0)
+            stage.rectangle((-2, -2), (2, 2), material=black, turn=(0, np.pi / 2, 0)).visible_camera = False
+        stage.light("POINT", (-1.4, 0, 1.6), energy=100.0, shadow_soft_size=0.02)
+        stage.camera_above(1.6)
+        found.append(irradiance(stage, PHOTONS, samples=samples, size=(64, 64)))
+    before, behind = found[0][:, :32], found[0][:, 32:]
+    assert behind.sum() < 2e-3 * before.sum()
+    assert before.sum() == pytest.approx(found[1][:, :32].sum(), rel=0.02)
 
 
 # Stress --------------------------------------------------------------------------------------------------------------
@@ -852,6 +873,47 @@ def test_gloss_shows_a_lamp_by_way_of_glass_without_dots(stage):
     truth = stage.render(4096, (24, 24), engine="CYCLES", bounces=4)["glossy_indirect"][..., 0]
     assert found.sum() == pytest.approx(truth.sum(), rel=0.05)
     assert np.square(found - truth).sum() < 2.0 * np.square(truth).sum()  # by rays 113
+
+
+ENGINES = "CANDELA", "CYCLES"
+SWITCHES = "caustics_reflective", "caustics_refractive"
+
+
+@pytest.mark.parametrize("off", [SWITCHES[:1], SWITCHES[1:], SWITCHES], ids=str)
+def test_switches_of_caustics_are_about_diffuse_surfaces(stage, off):
+    """Gloss sees the same light by way of glass, by photons, whatever Cycles' switches say."""
+    gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=0.4, Color=(1, 1, 1, 1))
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
+    ball(stage, glass(stage), place=(0, 0.9, 0.6), segments=48)
+    stage.light("POINT", location=(0.6, -0.9, 1.2), energy=100, shadow_soft_size=0.2)
+    stage.camera_above(1.2)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    found = [stage.render(4, (24, 24), bounces=4)["glossy_indirect"][..., 0]]
+    try:
+        for name in off:
+            setattr(stage.scene.cycles, name, False)
+        found.append(stage.render(4, (24, 24), bounces=4)["glossy_indirect"][..., 0])
+    finally:
+        for name in off:
+            setattr(stage.scene.cycles, name, True)
+    assert found[0].max() > 0.1
+    assert found[1] == pytest.approx(found[0], rel=1e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize("index", [1.5, 1.0])
+def test_glass_whose_caustics_are_off_stops_a_lamp(stage, index):
+    """As in Cycles: diffuse surfaces do without what it would let pass, even if that bends nothing."""
+    stage.floor()
+    box(stage, glass(stage, index), (-3, -3, 0.5), (3, 3, 0.55)).visible_camera = False
+    stage.light("POINT", (0, 0, 2), energy=100.0)
+    stage.camera_above(1.0)
+    stage.scene.candela.slot_indirect = "OFF"
+    try:
+        stage.scene.cycles.caustics_refractive = False
+        own, cycles = (stage.render(4, (8, 8), engine=name, bounces=2)["combined"][..., 0].mean() for name in ENGINES)
+    finally:
+        stage.scene.cycles.caustics_refractive = True
+    assert own == pytest.approx(cycles, rel=0.03, abs=0.02)
 
 
 def test_gloss_does_not_take_photons_of_a_lamp_that_rays_do_not_see_through_glass(stage):

@@ -43,21 +43,27 @@ def receivers(view):
 @pytest.mark.parametrize(
     "axes", [((0.5, 0, 0), (0, 0.5, 0)), ((0.9, 0.4, 0), (-0.1, 0.225, 0)), ((0.3, 0, 0), (0, 1.2, 0))]
 )
-def test_all_of_a_value_arrives(gpu_context, axes):
+@pytest.mark.parametrize("wall", [(1, 0, 2), (1, 0, 0), (0.6, -0.8, 0.3)])
+def test_all_of_a_value_arrives(gpu_context, axes, wall):
+    """Also where a wall, by direction and distance in half axes, ends the footprint (caustics/footprint.frag.glsl)."""
     view = view_from_above()
     position, normal, area = receivers(view)
-    records = [np.zeros((1, 2, 4), np.float32) for _ in splats.RECORD]
-    records[0][0, 0] = 0.1, -0.2, 0.0, 1.0  # the second record is empty
+    records = [np.zeros((1, 2, 4), np.float32) for _ in splats.RECORD]  # the second one is empty
     records[1][0, 0, :3], records[2][0, 0, :3] = axes
-    records[3][0, 0] = 2.0, 1.0, 0.5, 1.0  # w: the facing normal's third component
+    records[3][0, 0, :3] = 2.0, 1.0, 0.5
+    for record, share in zip(records[1:], wall):
+        record[0, 0, 3] = share
     target = images.Target((images.pool.take(SIDE, SIDE, "RGBA32F"),))
     target.clear()
-    splats.draw(
-        INTO_MAP, target, tuple(images.upload(record) for record in records),
-        textures={"receiver_position": position, "receiver_normal": normal},
-        blocks={"map_view": Block(VIEW, **view.values)},
-    )  # fmt: skip
-    drawn = images.read(target.colors[0])
+    places = 16  # so that it does not matter where in a texel the wall stands
+    for k in range(places):
+        records[0][0, 0] = 0.1 + k / places * area**0.5, -0.2 + 7 * k % places / places * area**0.5, 0.0, 1.0
+        splats.draw(
+            INTO_MAP, target, tuple(images.upload(record) for record in records),
+            textures={"receiver_position": position, "receiver_normal": normal},
+            blocks={"map_view": Block(VIEW, **view.values)},
+        )  # fmt: skip
+    drawn = images.read(target.colors[0]) / places
     images.pool.give(target.colors[0])
     assert drawn[..., :3].sum(axis=(0, 1)) * area == pytest.approx([2.0, 1.0, 0.5], rel=0.01)
 
