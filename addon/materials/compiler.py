@@ -349,10 +349,14 @@ REFRACTING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
 
 def may_refract(graph: Graph) -> bool:
-    """Whether some node of the graph can bend light: cheap, by its sockets alone."""
+    """Whether some node of the graph can bend light: cheap, by its sockets alone. Thin walls let it pass straight on."""
     return any(
         node.type in REFRACTING
-        or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Transmission Weight")))
+        or (
+            node.type == "ShaderNodeBsdfPrincipled"
+            and _not_black(node.inputs.get("Transmission Weight"))
+            and not _not_black(node.inputs.get("Thin Wall"))
+        )
         for node in graph.nodes.values()
     )
 

@@ -57,7 +57,7 @@ from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACES, draw_scatter
 from ..surfaces.hits import Hits
 from ..surfaces.scatter_means import ScatterMeans
-from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
+from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, LOBE_CONSTANTS, PATH_BLOCKS, GatherBindings
 
 RAYS_INDIRECT = 4  # of a point in a sample
 CHOICE = "surface.walked"
@@ -97,7 +97,7 @@ INDIRECT = passes.fullscreen_program(
     "subsurface/indirect.frag.glsl",
     textures=(*GATHER_TEXTURES, *POINT_TEXTURES),
     blocks=PATH_BLOCKS,
-    constants=(*(one for one in GATHER_CONSTANTS if one[1] != "lobe_rays"), ("INT", "rays")),
+    constants=(*(one for one in GATHER_CONSTANTS if one not in LOBE_CONSTANTS), ("INT", "rays")),
     outputs=(("VEC4", "out_indirect"),),
 )
 CHORD = passes.fullscreen_program(
@@ -335,7 +335,7 @@ class ImageSpaceSubsurface(Technique):
         offered = provided.bindings
         textures = {name: offered["textures"][name] for _, name in GATHER_TEXTURES}
         program = asked(frame, INDIRECT, textures)
-        names = {name for _, name in GATHER_CONSTANTS} - {"lobe_rays"}
+        names = {name for kind, name in GATHER_CONSTANTS if (kind, name) not in LOBE_CONSTANTS}
         passes.fullscreen(
             program, target,
             textures={

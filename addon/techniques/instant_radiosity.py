@@ -47,6 +47,7 @@ from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..lighting.asked import lit_at_hits
+from ..lighting.caustic_casters import Answered
 from ..lighting.path_sources import shaded_roughness
 from ..lighting.virtual_lights import (
     PATH_BLOCKS,
@@ -79,9 +80,10 @@ NEAR_CONSTANTS = (
     ("FLOAT", "deeper"), ("VEC3", "mirrors_low"), ("VEC3", "mirrors_high"),
 )  # fmt: skip
 NOTHING_NEAR = {name: (0.0, 0.0, 0.0) if kind == "VEC3" else 0 for kind, name in NEAR_CONSTANTS}  # no light, no bounce
+LOBE_CONSTANTS = (("INT", "lobe_rays"), ("INT", "photons_shine"))
 GATHER_CONSTANTS = (
     *dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)),
-    ("INT", "lobe_rays"),
+    *LOBE_CONSTANTS,
     ("FLOAT", "shaded_roughness"),
 )
 
@@ -175,6 +177,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
         "deeper": deeper_weight(frame),
         **dict(zip(("mirrors_low", "mirrors_high"), frame.kept(Reflectance).mirrors_box)),
         "lobe_rays": 1 if frame.settings.schedule.is_draft else LOBE_RAYS,
+        "photons_shine": int(frame.shared(Answered).on_gloss),
     }
     bindings["constants"] |= {"shaded_roughness": shaded_roughness(frame), **constants}
     frame.provide(GatherBindings(bindings))

@@ -38,6 +38,23 @@ vec3 rough_albedo(vec3 albedo, float weight, float roughness)
   return albedo * average * (vec3(1.0) + oren_nayar_tint(rho) * (1.0 - average) / (vec3(1.0) - rho * (1.0 - average)));
 }
 
+float lobe_albedo(Surface s, float roughness, float mu)
+{
+  return max_component(s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, roughness, mu));
+}
+
+// Of a thin coat that is kept beside the lobe below it.
+float coat_albedo(Surface s, float mu)
+{
+  float albedo = 0.0;
+  // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+  for (bool coated = s.coated; coated; coated = false) {
+    Surface coat = surface_coat(s);
+    albedo = lobe_albedo(coat, coat.glossy_roughness, mu);
+  }
+  return albedo;
+}
+
 vec3 surface_albedo(Surface s, float mu)
 {
   vec3 albedo = rough_albedo(s.diffuse, s.diffuse_weight, s.diffuse_roughness);
@@ -49,16 +66,11 @@ vec3 surface_albedo(Surface s, float mu)
     albedo += s.glossy_weight *
               glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, roughness, mu);
   }
-  return max(albedo, vec3(0.0));
+  return max(albedo + coat_albedo(s, mu), vec3(0.0));
 }
 
 // Cosine between a normal and the mean direction from which diffuse light comes and to which it goes.
 #define MEAN_COSINE 0.577
-
-float lobe_albedo(Surface s, float roughness, float mu)
-{
-  return max_component(s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, roughness, mu));
-}
 
 // Fresnel's terms as Schlick's curve, `mu` as above. A layer leaves the more to what is below it the steeper one looks:
 // the camera's view of a floor is flat, that of what the floor lights is not.
@@ -96,6 +108,22 @@ Reflection surface_reflection(Surface s, float mu)
     r.straight = max(scale * s.glossy_tint, vec3(0.0));
     float rise = (s.kind == FRESNEL_NONE) ? 0.0 : (s.kind == FRESNEL_DIELECTRIC) ? mix(RISE, 1.0, narrow) : 1.0;
     r.grazing = mix(r.straight, max(scale, vec3(0.0)), rise);
+  }
+  for (bool coated = s.coated; coated; coated = false) {
+    // One lobe of both, as wide as the two are in the mean. What lies below has the light that the coat leaves.
+    Surface coat = surface_coat(s);
+    float covers = coat_albedo(s, MEAN_COSINE);
+    float leaves = (1.0 - min(covers, 0.9)) / (1.0 - min(coat_albedo(s, mu), 0.9));
+    r.diffuse *= leaves;
+    r.straight *= leaves;
+    r.grazing *= leaves;
+    float below = max_component(mix(r.straight, r.grazing, pow(1.0 - MEAN_COSINE, 5.0)));
+    r.alpha = (below * r.alpha + covers * LEAST_ALPHA) / max(below + covers, 1e-6);
+    vec3 scale = coat.glossy_weight
+                 * multiscatter_scale(coat.kind, coat.glossy_tint, coat.glossy_edge, coat.glossy_ior, sqrt(LEAST_ALPHA), mu);
+    float narrow = coat.glossy_roughness * coat.glossy_roughness / LEAST_ALPHA;
+    r.straight += scale * coat.glossy_tint;
+    r.grazing += mix(scale * coat.glossy_tint, scale, mix(RISE, 1.0, narrow));
   }
   r.diffuse = max(r.diffuse, vec3(0.0));
   return r;

@@ -97,7 +97,7 @@ void main()
 #endif
     }
     if (max_component(weight) > 0.0) {
-      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, roll);
+      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, glossy && photons_shine != 0, roll);
       if (glossy) {
         out_glossy.rgb += light;
       }

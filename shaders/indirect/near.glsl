@@ -30,6 +30,7 @@ struct Walk {
   vec3 direction;
   int bounce;   // how often light of sources has been reflected when it comes along here to what the picture shows
   bool whole;   // it brings all light of what it meets, however far that is
+  bool gloss;   // it begins at a glossy lobe that takes photons (caustics/gloss.glsl)
   bool has_met; // it has met `met` already
   Vertex met;
 };
@@ -47,6 +48,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
   vec3 sum = vec3(0.0);
   vec3 throughput = vec3(1.0);
   bool from_seen = walk.bounce == 1 && !walk.whole;  // from a surface of the picture, over smooth metal alone
+  bool from_gloss = walk.bounce == 1 && walk.gloss;  // from such a lobe, over glass alone
   bool farther = false;                              // a surface has sent light along the walk by virtual lights
   for (; walk.bounce <= bounces; walk.bounce++) {
     float share = 1.0;
@@ -72,8 +74,9 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       }
     }
 #ifdef MIRRORS_OWNED
-    // Photons bring what a mirror sends to a diffuse surface of the picture, and to no other.
-    walk.met.photons = walk.met.photons && from_seen;
+    // Photons bring what a mirror sends to a diffuse surface of the picture, what glass does to gloss, too, and to no other.
+    from_gloss = from_gloss && walk.met.glass;
+    walk.met.photons = walk.met.photons && (from_seen || from_gloss);
 #endif
     walk.has_met = false;
     walk.whole = mirrored;
@@ -111,6 +114,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       farther = true;
     }
     from_seen = walk.bounce == 0;
+    from_gloss = false;
     roll = hash3(roll);
     vec3 reflected;
     vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));
@@ -123,14 +127,15 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
 
 // Radiance that arrives at a surface that the picture shows, along a ray from surfaces nearer than the bound (from all
 // surfaces, if `whole`). Behind a `whole` ray, of a lobe, the bound is `glossy_radius`: paths between surfaces that shine
-// bring much by few, and no filter spreads that.
-vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
+// bring much by few, and no filter spreads that. `gloss`: as of a walk.
+vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool gloss, uvec3 roll)
 {
   Walk walk;
   walk.origin = origin;
   walk.direction = direction;
   walk.bounce = 1;
   walk.whole = whole;
+  walk.gloss = gloss;
   walk.has_met = false;
   return radiance_along(walk, whole ? glossy_radius : near_radius, roll);
 }

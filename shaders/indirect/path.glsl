@@ -35,6 +35,7 @@ struct Vertex {
 #endif
 #ifdef MIRRORS_OWNED
   bool photons;  // lamps' light that it mirrors arrives as photons of caustics
+  bool glass;
 #endif
 #ifdef SMOOTH_MIRRORS
   // Of smooth metal: the lobe's own alpha (that of `reflection` is wider), below 0 elsewhere; the interpolated normal; and
@@ -112,7 +113,8 @@ vec3 mean_turned(ivec2 hit, vec3 normal, out float upright)
 }
 #endif
 
-// What a point reflects: exactly where the camera sees it, else the mean of its material.
+// What a point reflects: exactly where the camera sees it, else the mean of its material. Of glass the mean, too: that is
+// over the chance that rays do not pass, which the camera's surface is not.
 Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal, out vec3 turned, out float upright)
 {
   turned = normal;
@@ -124,8 +126,9 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal, out vec3 turned,
     vec4 seen = surface_position_fetch(pixel);
     if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
       Surface s = SURFACE_READ(pixel);
+      bool clear = (s.kind == LOBE_REFRACTION || surface_is_mirror_of_glass(s)) && max_component(s.diffuse) <= 0.0;
       // Of a holdout the picture has cut out what it reflects.
-      if (s.holdout < 1.0 && dot(s.geometric_normal, normal) > 0.9) {
+      if (s.holdout < 1.0 && dot(s.geometric_normal, normal) > 0.9 && !clear) {
 #ifdef TURNED_NORMALS
         turned = (s.bump > 0.0) ? s.normal : normal;
         upright = (s.bump > 0.0) ? max(dot(s.normal, normal), 0.05) : 1.0;
@@ -263,6 +266,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, 
 #ifdef MIRRORS_OWNED
   int material = triangle_material(hit);
   met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
+  met.glass = triangle_is_glass(hit);
 #endif
 #ifdef SMOOTH_MIRRORS
   mirror_met(met, hit, direction);

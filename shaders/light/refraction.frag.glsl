@@ -238,6 +238,7 @@ void main()
       rest.direction = direction;
       rest.bounce = 0;
       rest.whole = false;
+      rest.gloss = false;
       rest.has_met = true;
       rest.met.position = rest.origin = position;
       rest.met.normal = rest.met.lit = rest.met.turned = geometric_normal;
@@ -255,6 +256,7 @@ void main()
       rest.met.reflection.alpha = 1.0;
 #ifdef MIRRORS_OWNED
       rest.met.photons = false;
+      rest.met.glass = false;
 #endif
 #ifdef SMOOTH_MIRRORS
       rest.met.mirror_alpha = -1.0;

@@ -20,9 +20,9 @@ void store_closures(Closures c, SurfacePoint point, float covered, float holdout
                     lift_encode(octahedral_encode(point.geometric_normal), lift.x));
   out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, half_turns), 255.0));
   out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
-  float most = max(max(c.glossy_weight.x, c.glossy_weight.y), c.glossy_weight.z);
+  float most = max(max(out_tint.x, out_tint.y), out_tint.z);  // as it will be read
   bool coated = c.coat.x > 0.0 && most > 0.0;
-  vec3 edge = coated ? coat_encode(c.coat.x / most, c.coat.y, c.coat.z) : c.glossy_edge;
+  vec3 edge = coated ? coat_encode(c.coat.x * covered / most, c.coat.y, c.coat.z) : c.glossy_edge;
   float kind = float(c.kind) * 2097152.0 + pack_three(edge, 127.0);
   out_lobe = vec4(octahedral_encode(c.glossy_normal), coated ? -kind - 1.0 : kind, ior_encode(c.glossy_ior, c.distribution));
 #ifdef GLOWS

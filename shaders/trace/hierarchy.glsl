@@ -566,6 +566,12 @@ vec3 triangle_shading_normal(ivec2 hit, vec3 position)
   return safe_normalize(normal);
 }
 
+// Whether a triangle may bend rays: is glass.
+bool triangle_is_glass(ivec2 hit)
+{
+  return leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)] < 0.0;
+}
+
 // Whether a triangle is glass that is no closed solid, and a ray meets it from within.
 bool leaves_sheet(ivec2 hit, vec3 position, vec3 direction)
 {

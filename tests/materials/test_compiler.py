@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from addon.materials.compiler import compile_material, default_graph, may_mirror, may_tint
+from addon.materials.compiler import compile_material, default_graph, may_mirror, may_refract, may_tint
 from addon.materials.graph import Graph, Input, Node
 from addon.snapshot.scene import Image
 from tests.materials.graphs import diffuse, emission, graph, image, math, mix, node, principled, transparent
@@ -141,6 +141,15 @@ def test_every_approximation_is_named_only_when_it_is_seen():
     waxy = compiled(principled(Subsurface_Weight=0.5, Sheen_Weight=1.0, Thin_Wall=1.0), surface=("Principled", "BSDF"))
     assert len(waxy.fallbacks) == 1
     assert waxy.program_key == plain.program_key
+
+
+def test_a_thin_wall_bends_no_light():
+    """So it throws no caustics, and what shines through it casts its straight shadow."""
+    wall, pane = (
+        graph(principled(Transmission_Weight=1.0, Thin_Wall=thin), surface=("Principled", "BSDF"))
+        for thin in (1.0, 0.0)
+    )
+    assert may_refract(pane) and not may_refract(wall)
 
 
 def test_a_missing_image_is_pink_and_said():

@@ -74,3 +74,18 @@ def test_under_an_even_sky_clear_glass_changes_nothing(stage, shape):
     found = [stage.render(samples=16, size=(16, 16), bounces=4, seed=seed) for seed in range(4)]  # one seed errs by .02
     light = np.mean([images[path][..., 0] for images in found for path in paths]) * len(paths)
     assert light == pytest.approx(1.0, abs=0.04)
+
+
+def test_a_floor_has_the_light_that_glass_of_the_picture_mirrors(stage):
+    """Rays that glass stops see what it mirrors, whether the camera shows the glass or not."""
+    stage.floor()
+    stage.world()
+    made = ball(stage, glass(stage), radius=0.6, place=(0, 0, 0.6), segments=32)
+    stage.camera((0, -4, 1.0), (1.35, 0, 0), angle=0.4)
+    shown, alone = [], stage.render(1, (24, 18))["diffuse_color"][..., 0]
+    for made.visible_camera in (True, False):
+        images = [stage.render(samples=16, size=(24, 18), bounces=4, seed=seed) for seed in (1, 2)]
+        alone = np.minimum(alone, images[0]["diffuse_color"][..., 0])
+        shown.append(sum(one["diffuse_indirect"][..., 0] for one in images))
+    near = alone > 0.99  # the floor beside the ball
+    assert shown[0][near].mean() == pytest.approx(shown[1][near].mean(), rel=0.04)
