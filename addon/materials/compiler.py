@@ -349,7 +349,7 @@ REFRACTING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
 
 def may_refract(graph: Graph) -> bool:
-    """Whether some node of the graph can bend light: cheap, by its sockets alone. Thin walls let it pass straight on."""
+    """Whether some node of the graph can bend light: cheap, by its sockets alone. Thin walls let it pass straight."""
     return any(
         node.type in REFRACTING
         or (
