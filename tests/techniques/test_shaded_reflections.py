@@ -368,15 +368,16 @@ def test_lobes_that_none_are_as_smooth_as_take_no_rays(stage, roughness, rays):
     assert bool(row.counters.get("passes")) == rays
 
 
-def test_a_coat_that_is_drawn_apart_lights_others_as_before(stage, monkeypatch):
+def test_a_coat_that_is_drawn_apart_lights_others(stage):
     """A floor before dark metal under a clear coat, which the picture shows: the coat sends most of what it gets."""
     stage.rectangle((-3, -3), (3, 0), material=stage.diffuse(0.5))
     dark = stage.principled(Metallic=1.0, Roughness=0.35, Base_Color=(0.02, 0.02, 0.02, 1), Coat_Weight=1.0)
     stage.rectangle((-3, 0), (3, 3), material=dark, turn=(np.pi / 2, 0, 0))
     stage.light("AREA", (0, -3, 1.5), turn=(np.pi / 2, 0, 0), size=1.0)
     stage.camera((0, -5.0, 3.0), (1.1, 0, 0), angle=0.9)
-    found = []
-    for yes in (True, False):
-        apart(monkeypatch, yes)
-        found.append(stage.render(32, (24, 18), bounces=2)["diffuse_indirect"][..., :3].mean())
-    assert found[0] == pytest.approx(found[1], rel=0.08)
+    stage.scene.candela.use_denoise = False  # it spreads light over the pixels of so small a picture
+    own, truth = (
+        stage.render(samples, (24, 18), engine=engine, bounces=2)["diffuse_indirect"][..., :3].mean()
+        for engine, samples in (("CANDELA", 32), ("CYCLES", 512))
+    )
+    assert own == pytest.approx(truth, rel=0.15)
