@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.compare.passes import light_paths
 from addon.frame.shares import Turns
 from addon.techniques import shaded_reflections
 from addon.techniques.shaded_reflections import ShadedReflections
@@ -377,7 +378,7 @@ def test_a_coat_that_is_drawn_apart_lights_others(stage):
     stage.camera((0, -5.0, 3.0), (1.1, 0, 0), angle=0.9)
     stage.scene.candela.use_denoise = False  # it spreads light over the pixels of so small a picture
     own, truth = (
-        stage.render(samples, (24, 18), engine=engine, bounces=2)["diffuse_indirect"][..., :3].mean()
+        light_paths(stage.render(samples, (24, 18), engine=engine, bounces=2))["diffuse_indirect"].mean()
         for engine, samples in (("CANDELA", 32), ("CYCLES", 512))
     )
     assert own == pytest.approx(truth, rel=0.15)
