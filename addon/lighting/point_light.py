@@ -153,7 +153,8 @@ class PointLight:
         drawn = np.array([frame.random(f"{self._use}/world", number) for number in numbers])
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.EVEN_FLAG * world.even
         bright = caustic_casters.bright_world(frame) if photons else None
-        for direction, radiance, density in zip(*frame.environment.draw(*drawn.T)):
+        # Points lie where the camera sees nothing, too, as on the far side of a body that light comes through.
+        for direction, radiance, density in zip(*frame.environment.draw(*drawn.T, frame.environment.is_shut_out)):
             blocked = lights.GLASS_BLOCKS_FLAG * (bright is not None and bright.holds(radiance))
             yield lights.direction_row(direction, radiance / density, density, flags + blocked, 0, 1, each)
 

@@ -61,7 +61,6 @@ PROBES, DRAFT_PROBES = (16, 12), (12, 8)
 LEAST_RAYS, DRAFT_RAYS = 6, 3  # per probe
 CHOICE = 4  # candidates at least, for each virtual light that is kept
 NEAR = 0.1  # the bound of 128 virtual lights, in median distances of what is seen
-OPEN = 0.06  # of the world's light, from which directions to it are drawn alike whatever the camera sees
 LAMP_POINTS = 16  # on all lamps, which the paths of a sample look for
 OTHER_POINTS = (32, 24)  # of emissive surfaces and of the world: of one of them, or of each of both
 ONLY_POINTS = lights.MOST_LIGHTS - LAMP_POINTS  # of one of them in the only sample of a picture
@@ -296,8 +295,7 @@ class VirtualLights:
             chosen = np.array([frame.random("virtual lights/world", index) for index in numbers])
             bright = bright_world(frame)
             # What the camera's places see is another thing in each frame: all directions would move with it.
-            guided = frame.environment.open_share < OPEN
-            for direction, radiance, density in zip(*frame.environment.draw(*chosen.T, guided)):
+            for direction, radiance, density in zip(*frame.environment.draw(*chosen.T, frame.environment.is_shut_out)):
                 blocked = lights.GLASS_BLOCKS_FLAG * (bright is not None and bright.holds(radiance))
                 light = radiance / (density * share)
                 rows.append(lights.direction_row(direction, light, density, seen + blocked, 0, 1))

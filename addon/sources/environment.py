@@ -31,6 +31,7 @@ LARGEST_GRID = (256, 512)
 LEAST_BAKED = 512  # rows
 SMALLEST_GRID = (32, 64)  # for guiding, even where the image is smaller
 GUIDE_ROWS, GUIDE_COLUMNS = 16, 32
+OPEN = 0.06  # of the light, from which directions for what the camera does not see are drawn by radiance alone
 
 
 class Environment:
@@ -77,6 +78,12 @@ class Environment:
             known = self._light_cells.irradiance(self._to_world, 1.0 if self._openness is None else self._openness)
             self._known = images.upload(known.texels()), len(known.bright)
         return self._known
+
+    @property
+    def is_shut_out(self) -> bool:
+        """Whether so little of the light reaches what the camera sees that what it does not see is lit from there, too:
+        elsewhere such places want directions by radiance alone."""
+        return self.open_share < OPEN
 
     def openness(self, directions: np.ndarray) -> np.ndarray:
         """(...) how open the scene is towards directions (..., 3) of the world, as `guide` was told; else 1."""
