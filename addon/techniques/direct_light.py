@@ -19,8 +19,11 @@ chance (systematic sampling); every light keeps a minimum chance.
 
 Where the radius of a round light is more than a quarter of its distance, its visibility comes from rays.
 
-Bias: none that remains as samples grow. A point that stands for an area a of its light gives a receiver nearer than
-sqrt(a / pi) no more than at that distance: otherwise single points beside a surface would outshine the whole light.
+A point that stands for an area a of its light gives a receiver nearer than sqrt(a / pi) no more than at that distance:
+otherwise single points beside a surface would outshine the whole light. What that leaves out beside area lights each
+pixel adds by a point of its own (light/lamp_rays.glsl): 1 pass more for these, and rays where receivers are that near.
+
+Bias: none that remains as samples grow; what is left out where lamps are narrow, round or have linked blockers.
 """
 
 from __future__ import annotations
@@ -36,16 +39,38 @@ from ..lighting import shared_visibility
 from ..lighting.caustic_casters import answered
 from ..lighting.light_rates import LightRates, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, NEAR, RAYS_WHERE_NEAR, light_surfaces, lighting
-from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, ShadowLinks, VisibilityProvider
+from ..lighting.visibility import (
+    EDGES,
+    HARD,
+    NO_VIEWS,
+    RAY_CONSTANTS,
+    RAYS,
+    LightPoint,
+    Lookup,
+    Maps,
+    PlainMaps,
+    Rays,
+    ShadowLinks,
+    VisibilityProvider,
+    ray_bindings,
+)
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.rates import Rate
 from ..surfaces.draw import LIT_SURFACES
 
+LAMP_RAYS = Lookup(
+    "lamp rays",
+    "light/lamp_rays.glsl",
+    textures=acceleration.HIERARCHY_TEXTURES,
+    constants=RAY_CONSTANTS,
+    defines=(("OWN_POINTS", "1"),),
+    maps=False,
+)
 LIGHTING = tuple(
     lighting(lookup, soft_lobes)
-    for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS, shared_visibility.BETWEEN)
+    for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS, LAMP_RAYS, shared_visibility.BETWEEN)
     for soft_lobes in (False, True)
 )
 
@@ -70,6 +95,7 @@ class DirectLight(Technique):
         self._by_rays: dict[str, bool] = {}  # lights by key, of this frame
         self._unshadowed, self._rays = PlainMaps(lambda frame: 16), Rays()
         self._sources = lights.Sources()
+        self._beside: dict[str, float] = {}  # area lights by key: least squared distance from a receiver, m2
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not any(np.any(light.strength) for light in snapshot.lights):
@@ -82,7 +108,7 @@ class DirectLight(Technique):
         self._emitters = frame.emitters
         self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
         self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
-        self._by_rays = {}
+        self._by_rays, self._beside = {}, _squared_distances(frame, self._emitters)
         drawn, provider = PointsDrawn(), frame.service(VisibilityProvider)
         for emitter, weight in zip(self._emitters, 1.0 / self._chances(frame)):
             rate = self._rate(frame, emitter, weight, provider.serving(emitter) if provider else self._unshadowed)
@@ -92,11 +118,16 @@ class DirectLight(Technique):
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
-        yield from light_surfaces(frame, self, self._points(frame), lights.kinds_of(self._emitters), self._sources)
+        points, left_out = self._points(frame)
+        yield from light_surfaces(frame, self, points, lights.kinds_of(self._emitters), self._sources)
+        if left_out:
+            kinds = lights.kinds_of(self._emitters) & (1 << lights.RECTANGLE | 1 << lights.ELLIPSE)
+            yield from light_surfaces(frame, self, left_out, kinds, self._sources, lambda *_: _lamp_rays(frame))
+            frame.count(self, "lamps by points of pixels, too", len(left_out))
 
-    def _points(self, frame: Frame) -> list[LightPoint]:
-        """This sample's points on the lamps."""
-        service, found = frame.service(VisibilityProvider), []
+    def _points(self, frame: Frame) -> tuple[list[LightPoint], list[LightPoint]]:
+        """This sample's points on the lamps, and lamps of which these leave something out that pixels add."""
+        service, found, left_out = frame.service(VisibilityProvider), [], []
         for emitter, weight in self._chosen(frame):
             provider = service.serving(emitter) if service else self._unshadowed
             rate = self._rate(frame, emitter, weight, provider)
@@ -109,6 +140,7 @@ class DirectLight(Technique):
                 provider = self._rays
             flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
             flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
+            whole = False
             for number in rate.points(frame.sample):
                 part = provider.part(frame, emitter, number, points)
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
@@ -125,7 +157,15 @@ class DirectLight(Technique):
                 row[lights.LIGHT.at.flags] += lights.WHOLE_FLAG * whole + flags + lights.NEAR_FLAG * near
                 row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
                 found.append(LightPoint(row, provider, views))
-        return found
+            squared = self._beside.get(emitter.light.key, np.inf)
+            if squared < lights.footprint(emitter.area, points) and not (
+                whole or narrow or emitter.light.links.passing
+            ):
+                shadowed, each = int(bool(service) and emitter.light.cast_shadow), rate.per_sample
+                row = emitter.row(emitter.centre, 0, shadowed, weight * each, each, points)
+                row[lights.LIGHT.at.flags] += flags
+                left_out.append(LightPoint(row, self._rays))
+        return found, left_out
 
     def _blockers(self, frame: Frame, emitter: lights.Emitter) -> VisibilityProvider | None:
         """What tells the visibility of a lamp with shadow linking, if it has any."""
@@ -190,3 +230,25 @@ def _is_near(frame: Frame, emitter: lights.Emitter) -> bool:
         return False
     nearest = np.clip(emitter.centre, receivers.low, receivers.high)
     return emitter.radius > NEAR * float(np.linalg.norm(nearest - emitter.centre, axis=1).min())
+
+
+def _squared_distances(frame: Frame, emitters: list[lights.Emitter]) -> dict[str, float]:
+    """Of area lights by key: least squared distance of their box from those of receivers, m2; none in drafts, or where
+    nothing is traced."""
+    receivers = frame.receivers
+    if receivers is None or not len(receivers.distance) or frame.settings.schedule.is_draft:
+        return {}
+    if acceleration.too_many(frame.snapshot):
+        return {}
+    found = {}
+    for one in emitters:
+        if one.has_span:
+            half = np.abs(one.u[:3]) + np.abs(one.v[:3])
+            apart = np.maximum(np.maximum(receivers.low - one.centre, one.centre - receivers.high) - half, 0.0)
+            found[one.light.key] = float((apart**2).sum(axis=1).min())
+    return found
+
+
+def _lamp_rays(frame: Frame) -> Maps:
+    textures, constants = ray_bindings(frame)
+    return Maps(None, NO_VIEWS, LAMP_RAYS, textures=textures, constants=constants)

@@ -372,3 +372,19 @@ def test_a_small_lamp_far_away_is_seen_as_round_as_a_near_one(stage):
 def test_an_area_light_that_faces_away_gives_nothing(floor):
     floor.light("AREA", (0, 0, 2), (np.pi, 0, 0), size=0.5)
     assert floor.render(2)["diffuse_direct"].max() == 0
+
+
+def test_a_floor_close_to_an_area_light_has_its_light_in_one_sample(stage):
+    """Points that all pixels share shine as from no nearer than their spacing."""
+    stage.scene.candela.slot_shadow = "accumulated_maps"
+    height, half = 0.05, 1.0
+    stage.floor(material=stage.diffuse(0.5))
+    stage.light("AREA", (0, 0, height), energy=100.0, size=2 * half)
+    stage.camera_above(1.6)
+    y = (np.arange(200) + 0.5) / 100 - 1.0
+    x = places((16, 16), 1.6)[0][0]
+    radiance = 100.0 / (np.pi * (2 * half) ** 2)
+    squared = (x[:, None, None, None] - y[None, None, :, None]) ** 2 + (x[None, :, None, None] - y) ** 2 + height**2
+    expected = 0.5 / np.pi * radiance * (height**2 / squared**2).sum(axis=(2, 3)).mean() * (half / 100) ** 2
+    found = [stage.render(1, size=(16, 16), seed=seed)["combined"][..., :3].mean() for seed in range(3)]
+    assert np.mean(found) == pytest.approx(expected, rel=0.05)  # .08 without those of pixels
