@@ -137,7 +137,7 @@ CHOICES = 0.569840291  # from one interface's number to the next, as in caustics
 WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
 VERY_WIDE, MANY = 0.3, 128  # and from which on its image is wide, too: below so many samples it has several points
 MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
-MOST_ALONE = 32  # of a very wide one in a picture's only sample: each is blurred by the light's width over their root
+MOST_ALONE = 32  # in a picture's only sample: each is blurred by the light's width over the root of their number
 LEAST_SIDE, LEAST_PART = 48, 32  # photons along a side where points share a grid, and where that is a coarser one
 MOST_REACH = 2.0  # of a light, in diagonals of the casters, whose points share a map
 SPREAD_SIDE = 64  # where nothing makes light converge
@@ -170,17 +170,20 @@ class Bundle:
     traced: bool  # not by look-ups
 
 
-def _points(emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]], count: int) -> int:
-    """How many points of a light photons of one sample come from: several of a wide one where samples are few."""
+def _points(
+    emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]], count: int, on_gloss: bool = False
+) -> int:
+    """How many points of a light photons of one sample come from: several of a wide one where samples are few, most
+    where it is very wide or they shine `on_gloss`, too."""
     if emitter.kind == lights.SUN:
         width = float(np.tan(min(emitter.radius, 1.5)))
     else:
         place = emitter.position(emitter.middle())
         far = [np.linalg.norm((low + high) / 2 - place) for low, high in boxes]
         width = emitter.reach / max(min(far, default=np.inf), 1e-30)
-    few, most_points = FEW, MOST_POINTS
-    if width > VERY_WIDE:
-        few, most_points = MANY, max(MOST_ALONE // max(count, 1), 2 * MOST_POINTS)
+    few, most_points = (MANY, 2 * MOST_POINTS) if width > VERY_WIDE else (FEW, MOST_POINTS)
+    if width > VERY_WIDE or on_gloss:
+        most_points = max(MOST_ALONE // max(count, 1), most_points)
     most = int(np.clip(few // max(count, 1), 1, most_points)) if width > WIDE else 1
     return 1 << most.bit_length() - 1  # so that all of them are evenly spread
 
@@ -272,6 +275,7 @@ class Photons:
         on_gloss = frame.shared(caustic_casters.Answered).on_gloss
         alone = frame.settings.schedule.known_total and frame.settings.samples == 1
         whole = frame.settings.schedule.known_total
+        on_gloss = bool(frame.shared(caustic_casters.Answered).on_gloss)
         boxes = list(caustic_casters.boxes_of(frame, casters))
         most = min(side, SPREAD_SIDE) if casters.spreads else side
         answered, grids = self._rounds(frame, casters)[0], {}
@@ -292,7 +296,7 @@ class Photons:
                 # Sample 0 has its photons before it is known how many others do: those are a set without it.
                 index, sharing, of_turns = max(index - 1, 0), count - (index > 0), frame.settings.samples
             for (low, high), grid in zip(boxes, grids.get(id(emitter), [most] * len(boxes))):
-                parts = _points(emitter, [(low, high)], sharing)
+                parts = _points(emitter, [(low, high)], sharing, on_gloss)
                 parts = min(parts, max(MOST_POINTS // sharing, 1)) if casters.spreads else parts
                 strata = sharing * parts if whole else 0  # 1: see _drawn
                 strata = -1 if of_turns and sharing == count else strata
