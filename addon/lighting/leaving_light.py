@@ -33,8 +33,8 @@ from ..scene import acceleration
 from ..scene.scatter_points import RANGE, ROW, ScatterPoints
 from ..scene.view import VIEW
 from ..surfaces.hits import Hits
-from .walked_light import FEW_WALKS
 
+WALKS = 4  # of a point in a picture of one sample: their light arrives from many points
 RENEWED = 16  # samples after which the list is written anew, at most
 WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 5, images.LIST_WIDTH
 LEFT = ("sent", "slope", "same", "red", "green", "blue")
@@ -134,7 +134,7 @@ class LeavingLight:
             blocks={"film_view": frame.view_block},
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
-                "walks": 1 if settings.schedule.is_draft else max(FEW_WALKS // settings.samples, 1),
+                "walks": 1 if settings.schedule.is_draft else max(WALKS // settings.samples, 1),
                 "stride": stride_of(settings.samples) if self._drawn else 1,
             },
         )  # fmt: skip
