@@ -7,6 +7,11 @@ STRESS ?= 2000
 # Two processes: while one compiles shaders or runs Python, the other draws. More would only share a software GPU.
 PARALLEL := -n 2 --dist worksteal
 
+# COMPILE=quick: a software GPU (Mesa's llvmpipe) leaves out optimizations, for pictures as small as those of the tests.
+ifeq ($(COMPILE),quick)
+export GALLIVM_PERF := nopt
+endif
+
 ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 

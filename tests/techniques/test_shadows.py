@@ -312,8 +312,17 @@ def test_casters_at_rest_give_the_maps_that_instances_give(stage, monkeypatch, k
     """Closed, mirrored and open casters: written out in world space or drawn as instances, the picture is the same."""
     import bpy
 
+    from addon.lighting import depth_maps
     from addon.scene import casters
 
+    drawn = []
+
+    def keep(*arguments, draw=depth_maps._draw_resting):
+        drawn.append(draw(*arguments))
+        return drawn[-1]
+
+    monkeypatch.setattr(depth_maps, "_draw_resting", keep)
+    stage.scene.candela.slot_shadow, stage.scene.candela.accumulated_maps_by = "accumulated_maps", "MAPS"
     stage.floor()
     stage.camera_above(SPAN)
     bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.5, 0.4, 0.5))
@@ -323,9 +332,12 @@ def test_casters_at_rest_give_the_maps_that_instances_give(stage, monkeypatch, k
     stage.rectangle((0.2, -1.2), (0.9, -0.5), 0.7)
     stage.light(kind, (0.4, -0.2, 2.5), turn=(0.2, 0.1, 0))
     written_out = stage.render(4, (48, 48))["diffuse_direct"]
+    assert sum(drawn) > 0
+    drawn.clear()
     monkeypatch.setattr(casters, "LARGEST", 0)
     engine.free_sessions()
     as_instances = stage.render(4, (48, 48))["diffuse_direct"]
+    assert not drawn
     assert (written_out < 0.5 * written_out.max()).any()
     np.testing.assert_allclose(written_out, as_instances, atol=1e-4 * float(written_out.max()))
 

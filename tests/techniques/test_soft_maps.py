@@ -95,3 +95,14 @@ def test_a_far_background_takes_nothing_from_the_shadow_of_what_is_near(lit, far
     lit.floor(half=3.0)
     found = irradiance(lit, 1, SIZE)
     assert np.sqrt(((found - expected) ** 2).mean()) < 0.03 * expected.max()
+
+
+@pytest.mark.parametrize("technique", ["vssm", "cssm"])
+def test_patches_of_an_even_world_light_an_open_floor_with_all_of_it(stage, technique):
+    """Each patch is a sun with a disc there: together they are the world."""
+    stage.floor(material=stage.diffuse(0.5))
+    stage.world((0.3, 0.6, 1.0), 2.0)
+    stage.camera_above()
+    stage.scene.candela.slot_shadow = technique
+    shown = stage.render(32, (8, 8), bounces=0)["combined"][..., :3].mean(axis=(0, 1))  # few directions are noise
+    assert shown == pytest.approx([0.3, 0.6, 1.0], rel=0.01)
