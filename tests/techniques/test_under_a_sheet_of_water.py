@@ -1,5 +1,6 @@
 """Wide light on what lies under a single sheet of water: radiance passes its faces unscaled, as in Cycles."""
 
+import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
@@ -46,6 +47,18 @@ def test_frosted_water_mirrors_back_as_much_as_clear_water(stage):
 def test_a_ground_that_the_camera_sees_below_water_has_the_light_that_leaves_it(stage):
     """Of the world's light on the ground itself: t = (1 - F) / n2, as above."""
     pool(stage)
+    stage.scene.camera.location.z = -0.05
+    light = light_paths(stage.render(8, (16, 16), bounces=0))["diffuse_direct"].mean()
+    assert light == pytest.approx(0.5 * pane_passing(1.33)[1] / 1.33**2, rel=0.03)
+
+
+def test_a_window_elsewhere_leaves_a_pond_as_it_is(stage):
+    """A pane of two open faces, larger than the pond, is judged by itself."""
+    pool(stage)
+    glass = stage.material("ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0, IOR=1.33)
+    for side in (1, -1):
+        place = {"location": (60 + 0.05 * side, 0, 31), "turn": (0, side * np.pi / 2, 0)}
+        stage.rectangle((-30, -30), (30, 30), material=glass, **place)
     stage.scene.camera.location.z = -0.05
     light = light_paths(stage.render(8, (16, 16), bounces=0))["diffuse_direct"].mean()
     assert light == pytest.approx(0.5 * pane_passing(1.33)[1] / 1.33**2, rel=0.03)
