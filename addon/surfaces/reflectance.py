@@ -17,6 +17,7 @@ import numpy as np
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.picture import Frame
 from ..gfx import images, passes
+from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..materials import gloss
@@ -45,6 +46,7 @@ MIRRORS_OWNED = (("MIRRORS_OWNED", "1"),)
 TURNED = (("TURNED_NORMALS", "1"),)  # where a material turns normals
 MIRRORS = (("SMOOTH_MIRRORS", "1"),)  # where a material is smooth metal
 MIRRORS_DROPPED = (("MIRRORS_DROPPED", "1"),)  # where Blender's Reflective Caustics are off
+MATT = (("MATT", "1"),)  # where all materials are diffuse, and programs hold what a scene needs
 TURNING = ("ShaderNodeNormalMap", "ShaderNodeBump")
 
 
@@ -55,19 +57,18 @@ class Reflectance:
         self._keys: dict[int, object] = {}  # by material: of what its cell shows
         self.image: images.Image | None = None
         self.mirrors_box = np.zeros((2, 3))  # corners around all that mirrors, relative to the scene's origin
-        self._boxed: tuple | None = None  # the snapshot and the origin that the box is of
+        self._defines: tuple[tuple[str, str], ...] = ()  # of the image, by what materials do
+        self._known: tuple | None = None  # the snapshot and the origin that both are of
 
     def update(self, frame: Frame) -> None:
         """Draw anew the materials that have changed or whose surfaces have."""
         self._update(frame)
+        origin = tuple(frame.geometry.origin)
+        if self._known is None or self._known[0] is not frame.snapshot or self._known[1] != origin:
+            self._known = frame.snapshot, origin  # techniques ask in every sample
+            self.mirrors_box, self._defines = _mirrors_box(frame), _defines(frame)
         owned = MIRRORS_OWNED if frame.plan.owns(LIGHT_SPECULAR_DIFFUSE) else ()
-        mirrors = MIRRORS if any(smooth_metal(frame, k) for k in frame.snapshot.used_materials) else ()
-        boxed = frame.snapshot, tuple(frame.geometry.origin)
-        if self._boxed is None or self._boxed[0] is not boxed[0] or self._boxed[1] != boxed[1]:
-            self._boxed, self.mirrors_box = boxed, _mirrors_box(frame)  # techniques ask in every sample
-        dropped = () if frame.snapshot.film.caustics_reflective else MIRRORS_DROPPED
-        turned = TURNED if _turns_normals(frame) else ()
-        self.image.defines = (*owned, *mirrors, *dropped, *turned)
+        self.image.defines = (*owned, *self._defines)
 
     def _update(self, frame: Frame) -> None:
         keys = keys_of(frame)
@@ -192,7 +193,11 @@ def _values(view: dict) -> dict:
     }  # fmt: skip
 
 
-def _turns_normals(frame: Frame) -> bool:
-    """Whether a material that is shown has a normal map or bump."""
-    graphs = (frame.snapshot.materials[k].graph for k in frame.snapshot.used_materials)
-    return any(node.type in TURNING for graph in graphs for node in graph.nodes.values())
+def _defines(frame: Frame) -> tuple[tuple[str, str], ...]:
+    """What programs that read the image need, by what the materials do that are shown."""
+    used, snapshot = frame.snapshot.used_materials, frame.snapshot
+    mirrors = MIRRORS if any(smooth_metal(frame, k) for k in used) else ()
+    dropped = () if snapshot.film.caustics_reflective else MIRRORS_DROPPED
+    turned = any(node.type in TURNING for k in used for node in snapshot.materials[k].graph.nodes.values())
+    shines = to_hold(frame.materials.glossy or frame.materials.soft, True)
+    return (*mirrors, *dropped, *(TURNED if turned else ()), *(() if shines else MATT))

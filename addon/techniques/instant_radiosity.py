@@ -46,7 +46,7 @@ from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from ..lighting.asked import lit_at_hits
+from ..lighting.asked import asked, lit_at_hits
 from ..lighting.caustic_casters import Answered
 from ..lighting.path_sources import shaded_roughness
 from ..lighting.virtual_lights import (
@@ -107,27 +107,37 @@ SPREAD = passes.fullscreen_program(
 
 
 @cache
-def gather_program(kinds: int, glossy: bool, soft: bool, interleaved: bool = False) -> Program:
-    """For light sources of these kinds (bits as in lights.LAMPS), and surfaces that may be glossy, or have a lobe of
-    lib/soft_lobe.glsl; `interleaved`: one pixel of each rectangle."""
+def gather_program(interleaved: bool = False) -> Program:
+    """Virtual lights at pixels; `interleaved`: at one pixel of each rectangle."""
     return passes.fullscreen_program(
         "instant radiosity",
         "indirect/gather.frag.glsl",
         textures=GATHER_TEXTURES,
         blocks=PATH_BLOCKS,
         constants=(*GATHER_CONSTANTS, *TRACED.constants, *(RECTANGLE if interleaved else ())),
-        defines=(
-            *gather_defines(kinds, glossy, soft), ("SUBSETS", str(SUBSETS)),
-            *((("INTERLEAVED", "1"),) if interleaved else ()),
+        defines=(("SUBSETS", str(SUBSETS)), *((("INTERLEAVED", "1"),) if interleaved else ())),
+        outputs=(("VEC4", "out_diffuse"),),
+        leaves_out=(("leaving", "pixels gather virtual lights and look at no surface that sends light"),),
+    )
+
+
+@cache
+def near_program(kinds: int, glossy: bool, soft: bool, interleaved: bool = False, shared: bool = False) -> Program:
+    """Rays of pixels, for light sources of these kinds (bits as in lights.LAMPS), and surfaces that may be glossy, or
+    have a lobe of lib/soft_lobe.glsl. `shared`: with the light of virtual lights that regions have gathered."""
+    lobes = (("GLOSSY", glossy), ("SOFT", soft), ("INTERLEAVED", interleaved), ("SHARED", shared))
+    return passes.fullscreen_program(
+        "instant radiosity of regions" if shared else "instant radiosity, rays",
+        "indirect/near.frag.glsl",
+        textures=(*GATHER_TEXTURES, *((("RGBA32F", "shared_irradiance"),) if shared else ())),
+        blocks=PATH_BLOCKS,
+        constants=(
+            *GATHER_CONSTANTS, *(RECTANGLE if interleaved else ()), *((("IVEC2", "grid_offset"),) if shared else ()),
         ),
+        # Drivers that mask instead of branching would compute what a scene does not need.
+        defines=(("LIGHT_KINDS", str(kinds)), *((name, "1") for name, needed in lobes if needed)),
         outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
     )  # fmt: skip
-
-
-def gather_defines(kinds: int, glossy: bool, soft: bool) -> tuple[tuple[str, str], ...]:
-    """What a program leaves out that a scene does not need: drivers that mask instead of branching would compute it."""
-    lobes = (("GLOSSY", glossy), ("SOFT", soft))
-    return (("LIGHT_KINDS", str(kinds)), *((name, "1") for name, needed in lobes if needed))
 
 
 def lobes_of(frame: Frame) -> tuple[bool, bool]:
@@ -135,7 +145,10 @@ def lobes_of(frame: Frame) -> tuple[bool, bool]:
     return to_hold((frame.materials.glossy, frame.materials.soft), (True, True))
 
 
-GATHERS = (gather_program(-1, True, True), gather_program(0, False, False), gather_program(-1, True, True, True))
+GATHERS = (
+    *(gather_program(interleaved) for interleaved in (False, True)),
+    near_program(-1, True, True), near_program(0, False, False), near_program(-1, True, True, interleaved=True),
+)  # fmt: skip
 INDIRECT_WRITES = (
     Write("radiance.diffuse_indirect", "RGBA32F", "Light that diffuse surfaces receive from other surfaces", True),
     Write("radiance.glossy_indirect", "RGBA32F", "Light that glossy surfaces receive from other surfaces", True),
@@ -249,24 +262,37 @@ class InstantRadiosity(Technique):
             wanted = max(wanted // part.count, min(wanted, FEWEST_LIGHTS))
         lights = yield from self.virtual_lights.make(frame, self, wanted)
         reach = self._reach(frame, -(-lights.wanted // SUBSETS))
-        bindings = gather_bindings(frame, self.virtual_lights, lights, rays=self._rays(frame), **reach)
+        bindings = gather_bindings(frame, self.virtual_lights, lights, **reach)
         if self._interleaving is not None:  # turns are those of each pixel; what has no block looks in each sample
             deeper = _deeper_turn(part.visit(frame.sample), part.visits) if part is not None else 1.0
             bindings["constants"]["deeper"] = deeper
         yield
-        program = gather_program(self.virtual_lights.kinds, *lobes_of(frame), part is not None)
-        program = lit_at_hits(frame, program, bindings["textures"])
         if part is None:
             target = frame.target(*(write.name for write in INDIRECT_WRITES), depth=MARKS)
-            for rows in frame.bands(self):
-                passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
-                yield
+            yield from self._draw(frame, bindings, target, where=ANY_SURFACE)
         else:
-            yield from self._draw_part(frame, part, program, bindings)
+            yield from self._draw_part(frame, part, bindings)
         smooth(frame, self, "radiance.diffuse_indirect")
-        frame.count(self, "passes")
+        frame.count(self, "passes", 2)
 
-    def _draw_part(self, frame: Frame, part: Interleaving, program: Program, bindings: dict) -> Iterator[None]:
+    def _draw(
+        self, frame: Frame, bindings: dict, target: images.Target, part: Interleaving | None = None, **drawing
+    ) -> Iterator[None]:
+        """Virtual lights, then rays, of each band of rows, of all pixels or of a `part`."""
+        lights = {kind: dict(bound) for kind, bound in bindings.items()}
+        lights["constants"]["rays"] = self._rays(frame)
+        gather = asked(frame, gather_program(part is not None), lights["textures"])
+        near = near_program(self.virtual_lights.kinds, *lobes_of(frame), part is not None)
+        near = lit_at_hits(frame, near, bindings["textures"])
+        diffuse = images.Target(target.colors[:1], target.depth)
+        for first, end in frame.bands(self):
+            rows = (-(-first // part.rows), -(-end // part.rows)) if part else (first, end)
+            for program, into, bound in ((gather, diffuse, lights), (near, target, bindings)):
+                if rows[0] < rows[1]:
+                    passes.fullscreen(program, into, blend="ADDITIVE_PREMULT", rows=rows, **bound, **drawing)
+                yield
+
+    def _draw_part(self, frame: Frame, part: Interleaving, bindings: dict) -> Iterator[None]:
         """Draw one pixel of each rectangle, in an image of these alone: processors skip groups of pixels, but no
         single ones."""
         place = {"rectangle": (part.columns, part.rows), "place_within": part.place(frame.sample)}
@@ -274,11 +300,8 @@ class InstantRadiosity(Technique):
         size = part.size(*frame.size)
         with images.borrowed(*size, "RGBA32F") as diffuse, images.borrowed(*size, "RGBA32F") as glossy:
             drawn = images.Target((*diffuse.colors, *glossy.colors))
-            for first, end in frame.bands(self):
-                rows = -(-first // part.rows), -(-end // part.rows)
-                if rows[0] < rows[1]:
-                    passes.fullscreen(program, drawn, rows=rows, **bindings)
-                yield
+            drawn.clear()
+            yield from self._draw(frame, bindings, drawn, part)
             passes.fullscreen(
                 SPREAD, frame.target(*(write.name for write in INDIRECT_WRITES)), blend="ADDITIVE_PREMULT",
                 textures=dict(zip(("gathered_diffuse", "gathered_glossy"), drawn.colors)),

@@ -52,8 +52,8 @@ from .instant_radiosity import (
     GATHER_TEXTURES,
     InstantRadiosity,
     gather_bindings,
-    gather_defines,
     lobes_of,
+    near_program,
 )
 
 # From here on maps of clusters, which do not grow with the picture, cost less than rays of regions.
@@ -149,21 +149,7 @@ def regions(gather: Gather, listed: bool = True) -> Program:
 TRACED_REGIONS = regions(TRACED)
 
 
-@cache
-def shared_gather_program(kinds: int, glossy: bool, soft: bool) -> Program:
-    """As gather_program, for pixels whose regions have gathered the virtual lights."""
-    return passes.fullscreen_program(
-        "instant radiosity of regions",
-        "indirect/gather.frag.glsl",
-        textures=(*GATHER_TEXTURES, ("RGBA32F", "shared_irradiance")),
-        blocks=PATH_BLOCKS,
-        constants=(*GATHER_CONSTANTS, ("IVEC2", "grid_offset")),
-        outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
-        defines=(("SHARED", ""), *gather_defines(kinds, glossy, soft)),
-    )
-
-
-GATHERS_SHARED = (shared_gather_program(-1, True, True), shared_gather_program(0, False, False))
+GATHERS_SHARED = near_program(-1, True, True, shared=True), near_program(0, False, False, shared=True)
 
 
 def pixels_shown_alone(snapshot: Snapshot, settings: Settings) -> int:
@@ -208,7 +194,7 @@ class MultiresRadiosity(InstantRadiosity):
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
-        program = shared_gather_program(self.virtual_lights.kinds, *lobes_of(frame))
+        program = near_program(self.virtual_lights.kinds, *lobes_of(frame), shared=True)
         program = lit_at_hits(frame, program, bindings["textures"])
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)

@@ -17,7 +17,7 @@ and at what rays have met, too.
 | cost | per sample and bounce |
 |---|---|
 | rays | 1 per pixel that still has one, 1 to lights, 2 to 4 for light of other surfaces |
-| passes | 4, and 1 for each program of materials (masked by depth) |
+| passes | 5, and 1 for each program of materials (masked by depth) |
 | samples | as many as its share of the picture asks for, each bounce by itself (frame/shares.py); all, through glass |
 | bytes per pixel | 258 while it runs, of the pool |
 
@@ -91,7 +91,7 @@ from ..surfaces.hits import (
     take_closures,
 )
 from .environment_light import directions_rate
-from .instant_radiosity import NEAR_CONSTANTS, NOTHING_NEAR, GatherBindings
+from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
 EMISSIVE_POINTS, FEW_EMISSIVE_POINTS = 4, 16  # the second in pictures of fewer than FEW samples
@@ -177,17 +177,18 @@ def found_program(kinds: int, transmission: bool) -> Program:
 
 
 @cache
-def received_program(kinds: int, transmission: bool, soft_lobes: bool) -> Program:
-    """For sources of these kinds (bits as in lights.LAMPS; -1: any)."""
+def received_program(kinds: int, transmission: bool, soft_lobes: bool, bounced: bool = False) -> Program:
+    """For sources of these kinds (bits as in lights.LAMPS; -1: any). `bounced`: light of other surfaces."""
+    textures = (("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"), ("RGBA32F", "hit_passed"))
     return passes.fullscreen_program(
-        "light at hits",
-        "hits/received.frag.glsl",
-        textures=(
-            *PATH_TEXTURES, ("RGBA32F", "virtual_lights"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"),
-            ("RGBA32F", "hit_passed"),
-        ),
+        "bounced light at hits" if bounced else "light at hits",
+        "hits/bounced.frag.glsl" if bounced else "hits/received.frag.glsl",
+        textures=(*PATH_TEXTURES, *((("RGBA32F", "virtual_lights"),) if bounced else ()), *textures),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "repeats"), *REACH, *NEAR_CONSTANTS),
+        constants=(
+            ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "repeats"), *REACH,
+            *(NEAR_CONSTANTS if bounced else ()),
+        ),
         defines=(
             ("LIGHT_KINDS", str(kinds)), *((("TRANSMISSION", "1"),) if transmission else ()), *SOFT_DEFINES[soft_lobes],
         ),
@@ -211,8 +212,9 @@ PROGRAMS = (
     *(scatter_program(start) for start in (OWN, ELSEWHERE, ONWARD)),
     *(found_program(-1, transmission) for transmission in (False, True)),
     *(
-        received_program(kinds, transmission, soft)
+        received_program(kinds, transmission, soft, bounced)
         for kinds, transmission, soft in ((-1, True, True), (0, False, False))
+        for bounced in (False, True)
     ),
 )
 DECLARED = guide_program(False), guide_program(True)
@@ -388,12 +390,16 @@ class ShadedReflections(Technique, BothWays):
                         closures.colors[LOBE].beside = {"surface_edit": turned.colors[0]}
                     self._into = drawing.images(number)
                     self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
+                    yield
                     self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                    yield
                     if not met:
                         drawing.done(number)
                         break
                     self._add_guide(frame, rays, records, closures, round_)
-                    self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                    yield from self._add_received(
+                        frame, rays, records, closures, sources, len(rows), round_, transmission
+                    )
                     if caustics:
                         self._add_caustics(frame, caustics, rays, records, closures, transmission)
                     drawing.done(number)
@@ -533,35 +539,45 @@ class ShadedReflections(Technique, BothWays):
             )
             frame.count(self, "passes")
 
-    def _add_received(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
-        hierarchy = frame.hierarchy("diffuse")
+    def _add_received(
+        self, frame, rays, records, closures, sources, count, reach, transmission
+    ) -> Iterator[None]:  # fmt: skip
+        """Light straight from sources, then that of other surfaces."""
         rays_of_pixel = frame.settings.samples * self._places(frame)
         repeats = max(-(-MORE_RAYS // rays_of_pixel), 1) if reach["ray_number"] < 2 else 1
+        common = {
+            **closure_bindings(closures), **frame.hierarchy("diffuse").textures,
+            "energy_table": frame.materials.energy_table, "reflectance": frame.materials.energy_table,
+            "ray_direction": rays.colors[1], "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"],
+        }  # fmt: skip
+        known = {name: reach[name] for _, name in REACH}
+        constants = {**known, "light_count": count, "offset_size": frame.offset_size, "repeats": repeats}
         provided = frame.service(GatherBindings)
-        near, known = NOTHING_NEAR, {name: reach[name] for _, name in REACH}
-        nothing = frame.materials.energy_table
-        textures = {"virtual_lights": nothing, "reflectance": nothing}
         if provided is not None:
-            near = {name: provided.bindings["constants"][name] for name in near}
-            textures = {name: provided.bindings["textures"][name] for name in textures}
-        program = received_program(self._sources.kinds, transmission, frame.materials.soft)
-        program, passed = lit_at_hits(frame, program, textures), records.images["hit_passed"]
-        passed.beside = linked.groups_of_hits(frame, self, self._rows, records.images["hit_triangle"])
-        passes.fullscreen(
-            program,
-            self._target(transmission, ("indirect",), records.target.depth),
-            blend="ADDITIVE_PREMULT",
-            where=MET,
-            textures={
-                **closure_bindings(closures), **hierarchy.textures, **textures,
-                "energy_table": frame.materials.energy_table, "ray_direction": rays.colors[1],
-                "met_path": rays.colors[2], "hit_passed": passed,
-            },
-            blocks={"film_view": frame.view_block, "sources": sources},
-            constants={**near, **known, "light_count": count, "offset_size": frame.offset_size, "repeats": repeats},
-        )  # fmt: skip
-        passed.beside = {}
-        frame.count(self, "passes")
+            common["reflectance"] = provided.bindings["textures"]["reflectance"]
+        drawn = [(False, {}, {})]
+        if provided is not None and provided.bindings["constants"]["glossy_radius"] > 0.0:
+            lights_of = {"virtual_lights": provided.bindings["textures"]["virtual_lights"]}
+            drawn.append((True, lights_of, {name: provided.bindings["constants"][name] for _, name in NEAR_CONSTANTS}))
+        for bounced, more, near in drawn:
+            textures = common | more
+            program = received_program(self._sources.kinds, transmission, frame.materials.soft, bounced)
+            program = lit_at_hits(frame, program, textures)
+            passed = textures["hit_passed"]
+            if not bounced:
+                passed.beside = linked.groups_of_hits(frame, self, self._rows, records.images["hit_triangle"])
+            passes.fullscreen(
+                program,
+                self._target(transmission, ("indirect",), records.target.depth),
+                blend="ADDITIVE_PREMULT",
+                where=MET,
+                textures=textures,
+                blocks={"film_view": frame.view_block, "sources": sources},
+                constants=constants | near,
+            )
+            passed.beside = {}
+            frame.count(self, "passes")
+            yield
 
     def _add_caustics(self, frame, maps, rays, records, closures, transmission) -> None:
         textures = closure_bindings(closures) | {

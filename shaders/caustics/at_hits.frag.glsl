@@ -3,7 +3,7 @@
 // one image.
 #include "lib/view.glsl"
 #include "lib/gbuffer.glsl"
-#include "hits/path.glsl"
+#include "hits/shown.glsl"
 
 // What is asked of a light's view (VIEW).
 struct KeptView {
@@ -74,10 +74,7 @@ vec3 irradiance_at(vec3 position, vec3 normal, ivec2 corner)
 
 void main()
 {
-  out_glossy_indirect = vec4(0.0);
-#ifdef TRANSMISSION
-  out_transmission_indirect = vec4(0.0);
-#endif
+  show_nothing();
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 path = met_path_fetch(pixel);
   int code = int(path.w + 0.5);
@@ -93,13 +90,5 @@ void main()
     irradiance += irradiance_at(place.xyz, normal, map_side * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
   }
   vec3 reflected = albedo / PI * irradiance;
-  vec4 light = vec4(path.rgb * hit_passed_fetch(pixel).rgb * reflected, 0.0);
-  if (path_is_glossy(code)) {
-    out_glossy_indirect = light;
-  }
-#ifdef TRANSMISSION
-  else {
-    out_transmission_indirect = light;
-  }
-#endif
+  show_light(code, vec4(0.0), vec4(path.rgb * hit_passed_fetch(pixel).rgb * reflected, 0.0));
 }

@@ -5,7 +5,8 @@
 #include "lib/random.glsl"
 #include "lib/environment.glsl"
 #include "light/sources.glsl"
-#include "hits/path.glsl"
+#define DIRECT_PATHS
+#include "hits/shown.glsl"
 
 // Of what a ray finds. `lobe_density` 0: only rays can find it; FOUND_ELSEWHERE: light samples have all of it.
 float share_of_ray(float lobe_density, float light_density)
@@ -51,12 +52,7 @@ vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, bool photo
 
 void main()
 {
-  out_glossy_direct = vec4(0.0);
-  out_glossy_indirect = vec4(0.0);
-#ifdef TRANSMISSION
-  out_transmission_direct = vec4(0.0);
-  out_transmission_indirect = vec4(0.0);
-#endif
+  show_nothing();
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 path = met_path_fetch(pixel);
   int code = int(path.w + 0.5);
@@ -90,14 +86,5 @@ void main()
   }
   vec4 light = vec4(path.rgb * passed.rgb * sum, hole ? dot(path.rgb, vec3(1.0 / 3.0)) : 0.0);
   light.rgb = is_finite(max_component(abs(light.rgb))) ? light.rgb : vec3(0.0);
-  if (glossy) {
-    out_glossy_direct = (ray_number > 0) ? vec4(0.0) : light;
-    out_glossy_indirect = (ray_number > 0) ? light : vec4(0.0);
-  }
-#ifdef TRANSMISSION
-  else {
-    out_transmission_direct = (ray_number > 0) ? vec4(0.0) : light;
-    out_transmission_indirect = (ray_number > 0) ? light : vec4(0.0);
-  }
-#endif
+  show_light(code, (ray_number > 0) ? vec4(0.0) : light, (ray_number > 0) ? light : vec4(0.0));
 }

@@ -1,33 +1,9 @@
-// Light that arrives at what rays have met and that is sent on along them: of this sample's points on lights, one of which
-// is traced, and of virtual lights and near surfaces (indirect/near.glsl). What a lobe sends that a ray follows is left to
-// that ray but for its share of the points.
-#define PART 128  // virtual lights that a hit looks at
-#include "indirect/near.glsl"
-#ifdef TRANSMISSION
-#include "lib/refraction.glsl"
-#endif
+// Light that arrives at what rays have met, straight from this sample's points on lights, and that is sent on along them:
+// one point is traced. What a lobe sends that a ray follows is left to that ray but for its share of the points.
+#include "hits/receiver.glsl"
 #ifdef SOFT_LOBES
 #include "lib/soft_lobe.glsl"
 #endif
-#include "hits/path.glsl"
-#include "hits/onward.glsl"
-
-struct Receiver {
-  Surface surface;
-  vec3 viewer;
-  bool shines;     // has a lobe of microfacets that light samples can find
-  bool bends;
-  bool within;     // glass mirrors, whose rays bend where light samples would pass straight
-  bool followed;   // by a ray
-  bool turned;     // by an edit where it leaves glass: rays alone find what is there
-  bool ended;      // would be, but for the number of bounces: shows nothing
-  int group;       // of receivers
-  int mirrored;    // by so many surfaces on the way to the camera
-  Lobe lobe;
-#ifdef TRANSMISSION
-  Interface glass;
-#endif
-};
 
 // Radiance towards the viewer by a source if nothing blocks it.
 vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, float density)
@@ -117,108 +93,22 @@ vec3 direct_light(Receiver r, uint salt)
   return blocked ? vec3(0.0) : chosen_light * (total / chosen_share);
 }
 
-// Light of other surfaces: by virtual lights, and by a short ray for what those leave out.
-vec3 indirect_light(Receiver r, uvec3 roll)
-{
-  vec3 sum = vec3(0.0);
-  Reflection reflection = surface_reflection(r.surface, max(dot(r.surface.geometric_normal, r.viewer), 0.0));
-  if (r.followed || r.bends || r.ended) {
-    reflection.straight = reflection.grazing = vec3(0.0);
-  }
-  vec3 lit = r.surface.normal;
-  vec3 side = r.surface.geometric_normal;
-  vec3 position = r.surface.position;
-  if (max_component(reflection.through) > 0.0) {
-    bool passes = reflects_far_side(reflection, to_unit(hash3(roll).x));
-    position -= passes ? max(-reflection.rough, 0.0) * side : vec3(0.0);
-    lit = passes ? -lit : lit;
-    side = passes ? -side : side;
-  }
-  if (max_component(reflection.diffuse + reflection.grazing) <= 0.0) {
-    return sum;
-  }
-  vec3 from;
-  vec3 arriving = virtual_irradiance(position, lit, glossy_radius, r.mirrored > 0, roll.z, from);
-  sum += arriving * reflection_of(reflection, lit, from, r.viewer);
-  Walk walk;
-  vec3 weight;
-  walk.direction = reflection_sample(reflection, lit, r.viewer, vec2(to_unit(roll.x), to_unit(roll.y)), weight);
-  if (dot(walk.direction, side) > 0.0 && max_component(weight) > 0.0) {
-    walk.origin = ray_origin(position, side);
-    walk.bounce = 1;
-    walk.whole = false;
-  walk.gloss = false;
-    walk.has_met = false;
-    sum += weight * radiance_along(walk, glossy_radius, hash3(roll));
-  }
-  return sum;
-}
-
 void main()
 {
-  out_glossy_indirect = vec4(0.0);
-#ifdef TRANSMISSION
-  out_transmission_indirect = vec4(0.0);
-#endif
+  show_nothing();
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec4 path = met_path_fetch(pixel);
-  int code = int(path.w + 0.5);
-  if (code == 0 || surface_position_fetch(pixel).w == 0.0) {
+  Receiver r;
+  if (!receiver_at(pixel, r)) {
     return;
   }
-  Receiver r;
-  r.surface = SURFACE_READ(pixel);
-  r.viewer = -ray_direction_fetch(pixel).xyz;
-#ifdef HAS_RECEIVER_GROUPS
-  r.group = int(receiver_groups_fetch(pixel).x + 0.5);
-#endif
-  bool has_lobe = max_component(r.surface.glossy_weight) > 0.0;
-#ifdef TRANSMISSION
-  r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;
-#else
-  r.bends = false;
-#endif
-  r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
-  r.mirrored = path_mirrors(code);
-  bool goes_on = lobe_goes_on(r.surface);
-  r.within = mirrors_within(r.surface);
-  r.followed = has_lobe && goes_on && ray_number + 1 < rays
-               && (r.bends ? ray_number < interfaces : r.mirrored < mirrors);
-  r.turned = path_is_edited(code) && r.bends && r.surface.glossy_ior <= 1.0;
-  r.ended = has_lobe && goes_on && !r.followed;
-  r.lobe = lobe_begin(r.surface, r.viewer);
-  r.shines = r.shines && !lobe_is_mirror(r.lobe);
-#ifdef TRANSMISSION
-  r.glass = interface_met(r.surface, r.viewer, r.mirrored < mirrors);
-#endif
-  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + ray_number);
-  // Light from below the surface takes the place of what a diffuse one would send.
-  vec3 diffuse = r.surface.diffuse;
-  vec3 sent;
-  vec3 part;
-  vec3 same;
-  bool leaves = light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, roll.y, sent, part, same);
-  vec3 straight = leaves ? diffuse * (vec3(1.0) - part) : diffuse;
-  vec3 onward = leaves ? diffuse * (vec3(1.0) - part * (vec3(1.0) - same)) : diffuse;
-  vec3 sum = leaves ? float(repeats) * diffuse * part * sent : vec3(0.0);
+  uvec3 roll = receiver_roll(pixel);
+  vec3 straight;
+  vec3 onward;
+  vec3 sum = float(repeats) * light_left(r, roll.y, straight, onward);
+  r.surface.diffuse = straight;
   for (int k = 0; k < repeats; k++) {
-    r.surface.diffuse = straight;
     sum += direct_light(r, roll.x);
-    r.surface.diffuse = onward;
     roll = hash3(roll);
-    if (glossy_radius > 0.0 && r.mirrored < bounces) {
-      sum += indirect_light(r, roll);
-    }
   }
-  sum /= float(repeats);
-  vec4 light = vec4(path.rgb * hit_passed_fetch(pixel).rgb * sum, 0.0);
-  light.rgb = is_finite(max_component(abs(light.rgb))) ? light.rgb : vec3(0.0);
-  if (path_is_glossy(code)) {
-    out_glossy_indirect = light;
-  }
-#ifdef TRANSMISSION
-  else {
-    out_transmission_indirect = light;
-  }
-#endif
+  show_sent(r, sum / float(repeats));
 }

@@ -1,5 +1,6 @@
 // What surfaces reflect, reduced to what paths need: how much of the light that meets them leaves them again, and a glossy
-// lobe of few numbers.
+// lobe of few numbers. Where MATT is defined (addon/surfaces/reflectance.py) all surfaces are diffuse, and none lets light
+// through.
 
 #include "lib/hair.glsl"
 
@@ -83,6 +84,7 @@ Reflection surface_reflection(Surface s, float mu)
   r.straight = vec3(0.0);
   r.grazing = vec3(0.0);
   r.alpha = 1.0;
+#ifndef MATT
   if (s.kind > LOBE_REFRACTION) {
     r.diffuse += s.glossy_weight * soft_lobe_albedo(s);
     if (s.kind == LOBE_TRANSLUCENT) {
@@ -100,9 +102,16 @@ Reflection surface_reflection(Surface s, float mu)
     vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
     float narrow = min(sqrt(alpha.x * alpha.y) / LEAST_ALPHA, 1.0);
     r.alpha = max(sqrt(alpha.x * alpha.y), LEAST_ALPHA);
-    if (s.kind == FRESNEL_DIELECTRIC) {
-      float roughness = lobe_roughness(alpha);
-      r.diffuse *= (1.0 - min(lobe_albedo(s, roughness, MEAN_COSINE), 0.9)) / (1.0 - min(lobe_albedo(s, roughness, mu), 0.9));
+    float roughness = lobe_roughness(alpha);
+    vec3 again = multiscatter_reflectance(FRESNEL_DIELECTRIC, s.glossy_tint, s.glossy_edge, s.glossy_ior, roughness);
+    // A loop of a length that compilers do not know: they would compile what is in it twice.
+    for (int k = (s.kind == FRESNEL_DIELECTRIC) ? 2 : 0; k > 0; k--) {
+      float cosine = (k == 1) ? MEAN_COSINE : mu;
+      float energy = clamp(ggx_energy(cosine, roughness), 1e-4, 1.0);
+      float shape = dielectric_layer_shape(cosine, roughness, s.glossy_ior);
+      vec3 albedo = (vec3(energy) + again * (1.0 - energy)) * mix(s.glossy_tint, vec3(1.0), shape);  // as glossy_albedo
+      float left = 1.0 - min(max_component(s.glossy_weight * albedo), 0.9);
+      r.diffuse *= (k == 1) ? left : 1.0 / left;
     }
     vec3 scale = s.glossy_weight * multiscatter_scale(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, sqrt(r.alpha), mu);
     r.straight = max(scale * s.glossy_tint, vec3(0.0));
@@ -125,6 +134,7 @@ Reflection surface_reflection(Surface s, float mu)
     r.straight += scale * coat.glossy_tint;
     r.grazing += mix(scale * coat.glossy_tint, scale, mix(RISE, 1.0, narrow));
   }
+#endif
   r.diffuse = max(r.diffuse, vec3(0.0));
   return r;
 }
@@ -162,6 +172,7 @@ vec3 reflection_of(Reflection r, vec3 normal, vec3 light, vec3 viewer)
   for (float rough = min(r.rough, min(nl, nv) * 1e5); rough > 1e-4; rough = 0.0) {
     sum = diffuse_reflection(r.diffuse, 1.0, r.rough, normal, viewer, light) / nl;
   }
+#ifndef MATT
   for (bool passes = r.rough < 0.0 && nl > 0.0 && nv < 0.0; passes; passes = false) {
     sum *= strand_ahead(r.alpha, -dot(light, viewer));
   }
@@ -174,6 +185,7 @@ vec3 reflection_of(Reflection r, vec3 normal, vec3 light, vec3 viewer)
     vec3 fresnel = mix(r.straight, r.grazing, pow(clamp(1.0 - dot(light, middle), 0.0, 1.0), 5.0));
     sum += fresnel * (squared / (PI * d * d) * 0.5 / masked);
   }
+#endif
   return sum;
 }
 
@@ -183,6 +195,11 @@ vec3 reflection_of(Reflection r, vec3 normal, vec3 light, vec3 viewer)
 // then, for each time that it leaves at a grazing angle.
 vec3 reflection_sample(Reflection r, vec3 normal, vec3 viewer, vec2 u, out vec3 weight)
 {
+#ifdef MATT
+  vec3 even = cosine_direction(normal, u);
+  weight = (dot(normal, even) > 0.0) ? PI * reflection_of(r, normal, even, viewer) : vec3(0.0);
+  return even;
+#else
   float nv = dot(normal, viewer);
   vec3 reflected = mix(r.straight, r.grazing, pow(clamp(1.0 - nv, 0.0, 1.0), 5.0));
   float part = (nv > 0.0) ? luminance(reflected) / max(luminance(reflected + r.diffuse), 1e-30) : 0.0;
@@ -206,4 +223,5 @@ vec3 reflection_sample(Reflection r, vec3 normal, vec3 viewer, vec2 u, out vec3 
   }
   weight = (dot(normal, direction) > 0.0) ? PI * reflection_of(r, normal, direction, viewer) / density : vec3(0.0);
   return direction;
+#endif
 }

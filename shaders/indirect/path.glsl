@@ -282,11 +282,13 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, 
     met.reflection.diffuse *= onward;
   }
   met.lit = met.normal;
+#ifndef MATT
   if (max_component(met.reflection.through) > 0.0) {
     bool passes = reflects_far_side(met.reflection, to_unit(hash3(uvec3(salt, uint(hit.x), uint(hit.y))).x));
     met.lit = passes ? -met.normal : met.normal;
     met.turned = passes ? -met.turned : met.turned;
   }
+#endif
   return true;
 }
 

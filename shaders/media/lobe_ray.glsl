@@ -1,5 +1,6 @@
 // The ray of a pixel that mirrors and glass send on, up to what it has met, and the images that take what media send back along it.
-#include "hits/path.glsl"
+#define DIRECT_PATHS
+#include "hits/shown.glsl"
 
 struct ViewRay {
   vec3 origin;
@@ -25,16 +26,6 @@ vec3 layers_before(ivec2 pixel, float t)
   return vec3(1.0);
 }
 
-void show_nothing()
-{
-  out_glossy_direct = vec4(0.0);
-  out_glossy_indirect = vec4(0.0);
-#ifdef TRANSMISSION
-  out_transmission_direct = vec4(0.0);
-  out_transmission_indirect = vec4(0.0);
-#endif
-}
-
 // What media send back along a ray counts as light that the first surface mirrors or lets pass: what they emit, direct on
 // the first ray; all else indirect, as in Cycles.
 void show(ivec2 pixel, vec3 scattered, vec3 emitted)
@@ -42,14 +33,5 @@ void show(ivec2 pixel, vec3 scattered, vec3 emitted)
   vec4 path = met_path_fetch(pixel);
   vec3 direct = (ray_number == 0) ? path.rgb * emitted : vec3(0.0);
   vec3 indirect = path.rgb * scattered + ((ray_number == 0) ? vec3(0.0) : path.rgb * emitted);
-  if (path_is_glossy(int(path.w + 0.5))) {
-    out_glossy_direct = vec4(direct, 0.0);
-    out_glossy_indirect = vec4(indirect, 0.0);
-  }
-#ifdef TRANSMISSION
-  else {
-    out_transmission_direct = vec4(direct, 0.0);
-    out_transmission_indirect = vec4(indirect, 0.0);
-  }
-#endif
+  show_light(int(path.w + 0.5), vec4(direct, 0.0), vec4(indirect, 0.0));
 }

@@ -1,6 +1,7 @@
 """What a viewport shows while the programs of its picture are compiled, and how long a redraw takes then."""
 
 import warnings
+from dataclasses import replace
 from types import SimpleNamespace
 
 import bpy
@@ -13,6 +14,7 @@ from addon.gfx import device, images, library
 from addon.scene.view import View
 from addon.surfaces.first_look import HEADLIGHT, FirstLook
 from addon.ui import ENGINE
+from addon.ui.properties import settings_of
 from tests.viewport.region import SIZE, Region
 
 
@@ -81,6 +83,35 @@ def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones
     expected = warm.rest()
     warm.viewport.release()
     np.testing.assert_array_equal(images.read(cold.viewport.picture), expected)
+
+
+def test_programs_that_follow_rays_come_in_one_by_one(scene, monkeypatch):
+    """They are the largest: no part of a sample compiles two, of a draft or in full, of pixels or of what mirrors show."""
+    material = material_named("Shiny")
+    material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.15
+    bpy.data.objects["Cube"].data.materials.append(material)
+    library._shaders.clear()
+    made, compile_one = [], library._compile
+
+    def noted(program):
+        source = program.fragment or program.compute
+        if any(file == "trace/hierarchy.glsl" for file, _ in library.resolve(source, dict(program.snippets))[1]):
+            made.append(program.name)
+        return compile_one(program)
+
+    monkeypatch.setattr(library, "_compile", noted)
+    region = Region()
+    settings = replace(settings_of(scene, viewport=True), samples=2)
+    renderer, snapshot = region.viewport.renderer, region.source(region.camera, *SIZE)
+    together = []
+    for drawn in (settings.as_draft(), settings):
+        frame, before = renderer.begin(snapshot, drawn), len(made)
+        for _ in renderer.steps(frame):
+            together.append(made[before:])
+            before = len(made)
+    region.viewport.release()
+    assert {"instant radiosity", "instant radiosity, rays", "light at hits", "bounced light at hits"} <= set(made)
+    assert max(map(len, together)) == 1, [names for names in together if len(names) > 1]
 
 
 def test_programs_that_a_driver_compiles_while_it_draws_come_in_over_many_redraws(cold, monkeypatch):
