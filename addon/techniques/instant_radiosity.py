@@ -198,7 +198,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
 
 
 def deeper_weight(frame: Frame) -> float:
-    """Weight in this sample of light that was reflected more than once between close surfaces (gather.frag.glsl).
+    """Weight in this sample of light that was reflected more than once between close surfaces (near.frag.glsl).
 
     One of DEEPER samples has it, not always the first of them, whose numbers all lie in one half (sequence.py).
     Pictures of few samples, and those that are shown while they grow, have it in each.

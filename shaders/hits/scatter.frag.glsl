@@ -144,7 +144,7 @@ void main()
 #ifdef ONWARD
   bool mirrored_on = lobe_goes_on(s);
 #else
-  bool mirrored_on = s.glossy_roughness <= shaded_roughness;  // rougher ones are gathered (indirect/gather.frag.glsl)
+  bool mirrored_on = s.glossy_roughness <= shaded_roughness;  // rougher ones are gathered (indirect/near.frag.glsl)
 #endif
   bool enters = false;  // whether an edit sends what leaves a solid into it again
   if (s.kind == LOBE_REFRACTION && ray_number <= interfaces) {

@@ -1,9 +1,12 @@
 """The world as a light: irradiance and occlusion of the sky in closed form, images, visibility."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 
+from addon.frame.settings import Settings
 from addon.lighting.maps_or_rays import Compared
 from addon.sources import environment
 from addon.sources.rates import Rate
@@ -283,3 +286,10 @@ def test_directions_that_are_not_guided_are_the_same_whatever_the_camera_sees(st
         assert not np.allclose(world.draw(*numbers)[0], plain[0])
     world.guide(None)
     assert np.array_equal(world.draw(*numbers)[0], plain[0]) and world.open_share == 1.0
+
+
+def test_maps_of_drafts_are_not_as_coarse_as_their_pixels():
+    """A draft of 40 x 30 pixels had maps of 64 texels: lit squares stood in the crease of a backdrop in the shadow."""
+    for drawn, side in ((Settings(), 64), (Settings().as_draft(), environment_light.LEAST_IN_DRAFTS)):
+        frame = SimpleNamespace(size=(40, 30), settings=drawn)
+        assert environment_light.EnvironmentLight()._resolution(frame) == side

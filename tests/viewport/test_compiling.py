@@ -86,7 +86,7 @@ def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones
 
 
 def test_programs_that_follow_rays_come_in_one_by_one(scene, monkeypatch):
-    """They are the largest: no part of a sample compiles two, of a draft or in full, of pixels or of what mirrors show."""
+    """They are the largest: no part of a sample compiles two, in a draft or in full, at pixels or in mirrors."""
     material = material_named("Shiny")
     material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.15
     bpy.data.objects["Cube"].data.materials.append(material)
