@@ -36,6 +36,7 @@ from ..kernels import splats
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from . import caustic_casters
+from .asked import asked
 from .light_views import LightBuffers, LightView, widened
 from .path_sources import ShadedLobes
 from .photons import MAP, Bundle, LitView, Photons
@@ -269,6 +270,7 @@ def add_at_hits(
     program = at_hits_program(transmission)
     wanted = {name for _, name in program.textures}
     bound = {name: image for name, image in textures.items() if name in wanted}
+    program = asked(frame, program, bound)
     for one in maps:
         passes.fullscreen(
             program,

@@ -14,7 +14,8 @@ on the side where it came from.
 | bytes | 176 a point, up to 32 for each of 64^3 voxels an instance |
 
 Bias: even over a point's cell; colours and radii are the means of their material; of indirect light what leaves on the
-other side is lost. Burley's method sends as a diffuse surface does: so it does in Cycles.
+other side is lost. Burley's method sends as a diffuse surface does: so it does in Cycles, but in glass, where only the
+light that glass mirrors back is added here.
 """
 
 from __future__ import annotations
@@ -46,12 +47,13 @@ LEAVING = passes.fullscreen_program(
         ("RG32F", "trace_owners"),
         *(("RGBA32F", name) for name in (
             "point_position", "point_normal", "point_instances", "cell_direct", "cell_shapes", "scatter_objects",
-            "scatter_near", "scatter_means", "walk_lobes", "surface_position",
+            "scatter_near", "scatter_means", "walk_lobes", "surface_position", "cell_coat",
         )),
     ),
     blocks=((VIEW, "film_view"),),
     constants=(
-        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("FLOAT", "offset_size"),
+        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("INT", "in_glass"),
+        ("FLOAT", "offset_size"),
     ),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
     outputs=tuple(("VEC4", f"out_{name}") for name in LEFT),
@@ -115,9 +117,9 @@ class LeavingLight:
         flags[[k for k in walked if k < len(flags)]] = 1.0
         self.image = images.upload_list(np.concatenate([head, cells, instances, points.voxels]))
 
-    def draw(self, frame: Frame, points: ScatterPoints, textures: dict[str, images.Image]) -> int:
+    def draw(self, frame: Frame, points: ScatterPoints, textures: dict[str, images.Image], coated: bool = False) -> int:
         """Find what leaves in this sample; returns the number of passes. `textures`: cell_direct, cell_shapes,
-        scatter_means and walk_lobes."""
+        scatter_means, walk_lobes and cell_coat, which says by how much more light enters in glass where `coated`."""
         hierarchy, settings = frame.hierarchy("shadow"), frame.settings
         owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
         position, normal = points.surface(frame.sample)
@@ -134,6 +136,7 @@ class LeavingLight:
             blocks={"film_view": frame.view_block},
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
+                "in_glass": int(coated),
                 "walks": 1 if settings.schedule.is_draft else max(WALKS // settings.samples, 1),
                 "stride": stride_of(settings.samples) if self._drawn else 1,
             },

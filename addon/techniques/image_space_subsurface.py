@@ -33,6 +33,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..frame.light_paths import SUBSURFACE
 from ..frame.picture import Frame
 from ..frame.settings import Settings
@@ -42,15 +44,18 @@ from ..gfx.library import Program
 from ..kernels import diffusion
 from ..lighting import leaving_light, repeated_light, splatted_light, walked_light
 from ..lighting.asked import asked
+from ..lighting.caustic_casters import box_of
 from ..lighting.leaving_light import LeavingLight, LeavingService
 from ..lighting.point_light import LIGHTING, PointLight
 from ..lighting.splatted_light import Splats
 from ..lighting.visibility import RAYS, ray_bindings
 from ..materials import translucency
+from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import may_scatter, may_walk
 from ..scene import acceleration
 from ..scene.materials import SCATTER_IMAGES
 from ..scene.scatter_points import RANGE, ROW, ScatterPoints
+from ..scene.traced_triangles import ALONE
 from ..scene.view import VIEW
 from ..snapshot.panorama import bends_lines
 from ..snapshot.scene import Snapshot
@@ -114,8 +119,26 @@ CHORD = passes.fullscreen_program(
     defines=(("RANGE", str(RANGE)),),
     outputs=(("VEC4", "out_shape"),),
 )  # fmt: skip
+COAT = passes.fullscreen_program(
+    "subsurface coat",
+    "subsurface/coat.frag.glsl",
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES,
+        *POINT_TEXTURES[:2],
+        *(("RGBA32F", name) for name in ("point_instances", "scatter_means", "glass_indices")),
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "offset_size"), ("INT", "bounces")),
+    outputs=(("VEC4", "out_coat"),),
+)
 LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
 PROFILES, SPLATS = "PROFILES", "SPLATS"
+
+
+def _index_of(material: CompiledMaterial) -> float:
+    """Index of refraction of what is clear glass and nothing else; 0 of other materials."""
+    glass = material.glass
+    return glass.ior if glass is not None and glass.share > ALONE and glass.ior > 1.0 else 0.0
 
 
 class ImageSpaceSubsurface(Technique):
@@ -184,9 +207,10 @@ class ImageSpaceSubsurface(Technique):
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
         self._shapes: images.Image | None = None  # of cells: normal, depth, mean length of lines through
+        self._coat: images.Image | None = None  # of cells, where anything is glass: by how much more light enters
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
-        self._met: tuple[int, int, int] | None = None  # what the rays of these have met
+        self._met: tuple[int, ...] | None = None  # what the rays of these have met
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         shown = snapshot.used_materials
@@ -198,7 +222,7 @@ class ImageSpaceSubsurface(Technique):
         form = (
             splatted_light.PROGRAMS if self._splatted(settings, snapshot) else (GATHER, APPLY, *walked_light.PROGRAMS)
         )
-        return CHORD, LIGHTING, *form, *leaving_light.PROGRAMS
+        return CHORD, COAT, LIGHTING, *form, *leaving_light.PROGRAMS
 
     def _splatted(self, settings: Settings, snapshot: Snapshot) -> bool:
         """Whether light is summed by splats: not for panoramic cameras, whose lines are bent."""
@@ -233,7 +257,7 @@ class ImageSpaceSubsurface(Technique):
         means = frame.kept(ScatterMeans)
         means.update(frame, self._materials)
         # What stands inside an object makes it thinner, too.
-        met = frame.geometry.changes, frame.hierarchy("shadow").leaves.number, means.drawings
+        met = frame.geometry.changes, frame.hierarchy("shadow").leaves.number, means.drawings, frame.settings.bounces
         if moved or met != self._met:
             self._measure(frame)
             self._met = met
@@ -250,7 +274,9 @@ class ImageSpaceSubsurface(Technique):
                 frame.account.chose(self, "form", f"{PROFILES}, because {bends_lines(frame.snapshot)}")
         self._leaving_sample, self._direct = -1, None
         self._leaving.begin()
-        walked = [k for k in self._materials if may_walk(frame.snapshot.materials[k].graph)]
+        # In glass, which shows them without pixels around, other methods are known from points, too.
+        graphs = frame.snapshot.materials
+        walked = [k for k in self._materials if self._coat is not None or may_walk(graphs[k].graph)]
         if walked and self.points.rows:
             if moved or self._leaving.image is None:
                 self._leaving.update(self.points, walked)
@@ -281,6 +307,34 @@ class ImageSpaceSubsurface(Technique):
                 "first_leaf": first_leaf,
             },
         )  # fmt: skip
+        self._measure_coat(frame)
+
+    def _may_be_in_glass(self, snapshot: Snapshot, glass: np.ndarray) -> bool:
+        """Whether something that scatters and something of the materials `glass` have boxes that overlap."""
+        scattering = np.array([*self._materials])
+        boxes = [
+            [box_of(one, snapshot.meshes[one.mesh]) for one in snapshot.instances if np.isin(some, one.materials).any()]
+            for some in (scattering, glass)
+        ]
+        return any((low < b).all() and (a < high).all() for low, high in boxes[0] for a, b in boxes[1])
+
+    def _measure_coat(self, frame: Frame) -> None:
+        """What clear glass around points changes of the light that enters there."""
+        indices = np.array([_index_of(one) for one in frame.measured_materials], np.float32)
+        if not indices.any() or not self._may_be_in_glass(frame.snapshot, np.flatnonzero(indices)):
+            return
+        self._coat = images.pool.take(ROW, self.points.rows, "RGBA32F")
+        position, normal = self.points.surface(0)
+        passes.fullscreen(
+            COAT, images.Target((self._coat,)),
+            textures={
+                **frame.hierarchy("shadow").textures, "point_position": position, "point_normal": normal,
+                "point_instances": self.points.instances, "scatter_means": frame.kept(ScatterMeans).image,
+                "glass_indices": images.upload_list(np.repeat(indices[:, None], 4, axis=1)),
+            },
+            blocks={"film_view": frame.view_block},
+            constants={"offset_size": frame.offset_size, "bounces": frame.settings.bounces},
+        )  # fmt: skip
 
     # Light at points of the mesh --------------------------------------------------------------------------------------
 
@@ -289,7 +343,14 @@ class ImageSpaceSubsurface(Technique):
         direct = self._directly_lit(frame)
         indirect = images.pool.take(*direct.size, "RGBA32F")
         self._light_indirectly(frame, *self.points.surface(frame.sample), indirect)
+        self._enter(indirect)
         return direct, indirect
+
+    def _enter(self, light: images.Image) -> None:
+        """Light that arrives at points, as it enters through what coats them."""
+        if self._coat is not None:
+            target = images.Target((light,))
+            passes.fullscreen(passes.COPY, target, blend="MULTIPLY", textures={"original": self._coat})
 
     def _directly_lit(self, frame: Frame) -> images.Image:
         """Direct light of this sample at the points; `_direct` keeps it until the sample's end."""
@@ -307,6 +368,7 @@ class ImageSpaceSubsurface(Technique):
         drawn, rays = self._light.add(frame, surfaces, target, instances=self.points.instances)
         frame.count(self, "passes", drawn)
         images.pool.give(unused)
+        self._enter(direct)
         frame.count(self, "rays", rays * ROW * self.points.rows)
         self._direct = frame.sample, direct
         return direct
@@ -320,7 +382,9 @@ class ImageSpaceSubsurface(Technique):
                 {
                     "cell_direct": direct, "cell_shapes": self._shapes, "walk_lobes": self._lobes,
                     "scatter_means": frame.kept(ScatterMeans).image,
+                    "cell_coat": self._coat or self._shapes,  # not read without a coat
                 },
+                coated=self._coat is not None,
             )  # fmt: skip
             self._leaving_sample = frame.sample
             frame.count(self, "passes", drawn)
@@ -411,9 +475,10 @@ class ImageSpaceSubsurface(Technique):
         frame.count(self, "passes", 2)
 
     def _give_shapes(self) -> None:
-        if self._shapes is not None:
-            images.pool.give(self._shapes)
-        self._shapes = None
+        for image in (self._shapes, self._coat):
+            if image is not None:
+                images.pool.give(image)
+        self._shapes = self._coat = None
 
     def _give_whole(self) -> None:
         for target in self._whole:

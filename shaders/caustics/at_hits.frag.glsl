@@ -3,7 +3,9 @@
 // one image.
 #include "lib/view.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
 #include "hits/shown.glsl"
+#include "ask/leaving.glsl"
 
 // What is asked of a light's view (VIEW).
 struct KeptView {
@@ -89,6 +91,11 @@ void main()
     map_view = view_of_cell(cell);
     irradiance += irradiance_at(place.xyz, normal, map_side * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
   }
-  vec3 reflected = albedo / PI * irradiance;
+  // Light that enters surfaces elsewhere is known from their points, to which it comes straight.
+  vec3 sent;
+  vec3 part;
+  vec3 same;
+  bool leaves = light_leaves(-1, place.xyz, normal, normal, uint(pixel.x + 4096 * pixel.y), sent, part, same);
+  vec3 reflected = (leaves ? vec3(1.0) - part : vec3(1.0)) * albedo / PI * irradiance;
   show_light(code, vec4(0.0), vec4(path.rgb * hit_passed_fetch(pixel).rgb * reflected, 0.0));
 }

@@ -54,7 +54,8 @@ void main()
   vec4 color = scatter_means_fetch(at + ivec2(0, rows));
   vec4 share = scatter_means_fetch(at + ivec2(0, 2 * rows));
   int method = int(length_m.w + 0.5);
-  if (place.w == 0.0 || method == SCATTER_BURLEY || !(max_component(share.rgb) > 0.0)) {
+  vec4 coat = (in_glass != 0) ? cell_coat_fetch(texel) : vec4(1.0, 1.0, 1.0, 0.0);
+  if (place.w == 0.0 || !(max_component(share.rgb) > 0.0)) {
     return;
   }
   int listed = first_object + OBJECT_TEXELS * int(belongs.x + 0.5);
@@ -62,8 +63,16 @@ void main()
   grid = object_texel(listed + 1);
   voxels = object_texel(listed + 2);
   vec4 shape = cell_shapes_fetch(texel);
-  float part = walked_part(profile_of(PROFILE_WALK, length_m.xyz, color.rgb), object, 0.0, shape.y);
+  bool walks_below = method != SCATTER_BURLEY;
+  float part = walks_below ? walked_part(profile_of(PROFILE_WALK, length_m.xyz, color.rgb), object, 0.0, shape.y) : 0.0;
   if (part <= 0.0) {
+    // As a diffuse surface, for the light of it that glass around mirrors back.
+    out_sent = coat.w * vec4(min(shape.w, 1.0) * cell_direct_fetch(texel).rgb, 1.0);
+    out_same = coat.w * vec4(coat.rgb, 1.0);
+    vec3 found = coat.w * share.rgb;
+    out_red.w = found.r;
+    out_green.w = found.g;
+    out_blue.w = found.b;
     return;
   }
   vec4 normals = point_normal_fetch(texel);
@@ -95,12 +104,18 @@ void main()
   }
   rest *= walk_rest(color.rgb);
   vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / (max(color.rgb, vec3(1e-3)) * float(walks));
-  out_sent = vec4(sent_so_far * norm, float(walks));
+  // In glass the rest is sent as by a diffuse surface, too.
+  float rests = coat.w * (1.0 - part);
+  part += rests;
+  rests /= part;
+  vec3 diffuse = min(shape.w, 1.0) * cell_direct_fetch(texel).rgb;
+  out_sent = vec4(mix(sent_so_far * norm, diffuse, rests), float(walks));
   // One over the variance of the cosine, and of either component along the surface.
+  norm *= 1.0 - rests;
   out_slope = vec4(18.0 * by_cosine * norm, 0.0);
   vec3 found = part * share.rgb;
   out_red = vec4(4.0 * norm.r * aslant[0], found.r);
   out_green = vec4(4.0 * norm.g * aslant[1], found.g);
   out_blue = vec4(4.0 * norm.b * aslant[2], found.b);
-  out_same = vec4(same_so_far * norm, 1.0);
+  out_same = vec4((same_so_far * norm + vec3(rests)) * coat.rgb, 1.0);
 }

@@ -1,0 +1,78 @@
+// For points in clear solid glass, as of milk that touches its glass: by how much more or less light enters there than straight
+// rays bring. Rays of the cosine's density follow the glass's faces, mirrored by Fresnel's reflectance: of light from all
+// sides the share `leaves` that they leave by is what comes in (as in Cycles radiance is the same in glass as outside; straight
+// rays bring what a face lets pass, of the whole hemisphere), and what they bring `back` of what is sent enters once
+// more, as often as it leaves again:
+//
+//   leaves / (1 - F) * sum over bounces k of (albedo back)^k;     of a flat layer leaves = (1 - F) / n2, back = 1 - leaves
+//
+// Of what is mirrored back rays of indirect light bring some, too, from two bounces on: as much as a face mirrors straight on.
+// w: 1 in glass, else 0, and the factor is 1.
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "trace/rays.glsl"
+#include "subsurface/image.glsl"
+
+#define WAYS 64
+#define FACES 12  // that a ray is mirrored by
+
+// Index of refraction of a material that is clear glass and nothing else; 0 of others.
+float glass_index(ivec2 hit)
+{
+  int material = triangle_material(hit);
+  return glass_indices_fetch(ivec2(material & 2047, material >> 11)).x;
+}
+
+void main()
+{
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  vec4 place = point_position_fetch(texel);
+  vec3 face = octahedral_decode(point_normal_fetch(texel).zw);
+  uvec3 roll = hash3(uvec3(uvec2(texel), 7u));
+  float within = 0.0;
+  float index = 1.0;
+  float leaves = 0.0;
+  float back = 0.0;
+  for (int k = 0; k < WAYS && place.w > 0.0; k++) {
+    vec2 u = fract(vec2(to_unit(roll.x), to_unit(roll.y)) + vec2(float(k) / float(WAYS), to_unit(reverse_bits(uint(k)))));
+    vec3 direction = cosine_direction(face, u);
+    vec3 origin = ray_origin(place.xyz, face);
+    float left = 1.0;
+    for (int faces = 0; faces < FACES; faces++) {
+      ivec2 hit;
+      float t = trace_layers(origin, direction, 1e29, 0.0, roll.z + uint(k), true, false, hit);
+      vec3 met = origin + t * direction;
+      float n = (hit.x >= 0) ? glass_index(hit) : 0.0;
+      vec3 normal = (hit.x >= 0) ? triangle_shading_normal(hit, met) : direction;
+      float cosine = dot(normal, direction);
+      if (n <= 0.0 || cosine <= 0.0) {
+        // What stands in the glass; or the glass is not around the point.
+        back += (faces > 0) ? left : 0.0;
+        break;
+      }
+      within += (faces == 0) ? 1.0 : 0.0;
+      index = n;
+      float mirrored = fresnel_dielectric(cosine, 1.0 / n);
+      leaves += left * (1.0 - mirrored);
+      left *= mirrored;
+      direction = safe_normalize(direction - 2.0 * cosine * normal);
+      origin = met - ray_offset(met) * normal;
+      if (left < 1e-3) {
+        break;
+      }
+    }
+  }
+  out_coat = vec4(1.0, 1.0, 1.0, 0.0);
+  if (2.0 * within > float(WAYS)) {
+    int material = int(point_instances_fetch(texel).w + 0.5);
+    vec3 color = scatter_means_fetch(ivec2(material & 15, (material >> 4) + scatter_means_size().y / 3)).rgb;
+    float whole = max(leaves + back, 1e-6);
+    // Of even light a face from outside (Kulla and Conty 2017).
+    float passes = 1.0 - (index - 1.0) / (4.08567 + 1.00071 * index);
+    float straight = (index - 1.0) * (index - 1.0) / ((index + 1.0) * (index + 1.0));
+    float returned = clamp(back / whole - ((bounces > 1) ? straight : 0.0), 0.0, 0.99);
+    vec3 again = clamp(color, vec3(0.0), vec3(1.0)) * returned;
+    vec3 times = (vec3(1.0) - pow(again, vec3(float(bounces + 1)))) / (vec3(1.0) - again);
+    out_coat = vec4(leaves / (whole * passes) * times, 1.0);
+  }
+}
