@@ -10,9 +10,8 @@ Both a ray and a point may find the same light: they are weighted by the power h
 surface reflects of lamps and the world is left to traced_glossy.py, and what it lets pass of them to
 traced_refraction.py, whose walks by mean colours this technique replaces. Of smooth glass (Glass, and
 Principled's Transmission; roughness up to BOTH_ROUGHNESS) both ways are followed in each sample: what it lets pass,
-and what it mirrors; so are a thin coat and the lobe below it. In pictures of few samples so it is at up to
-MOST_THROUGH surfaces of glass behind it, of which one is chosen that mirrors. Of other lobes of a surface one is kept,
-and at what rays have met, too.
+and what it mirrors; so are a thin coat and the lobe below it. In pictures of few samples so it is at up to MOST_THROUGH
+surfaces of glass behind it, of which one is chosen that mirrors. Of other lobes one is kept, at hits, too.
 
 | cost | per sample and bounce |
 |---|---|
@@ -21,9 +20,8 @@ and at what rays have met, too.
 | samples | as many as its share of the picture asks for, each bounce by itself (frame/shares.py); all, through glass |
 | bytes per pixel | 258 while it runs, of the pool |
 
-In a picture of one sample rays start from four points of each pixel, in one of two or three from two: what a mirror
-shows has edges, which one ray does not average. The light at what they meet is asked for once by each, in place of four
-times at one hit. Corridor (bench/reflection_scenes.py), one sample: relMSE .126 to .077 in 1.2 times the time.
+With one sample rays start from four points of each pixel, with two or three from two: a mirror shows edges.
+Light at what they meet is asked for once by each. Corridor, one sample: relMSE .126 to .077 in 1.2 times the time.
 
 Rougher lobes than `roughness` see means (instant_radiosity.py), and so do drafts, pictures whose indirect light is not
 by virtual lights of that technique, and scenes above 4 million triangles.
@@ -140,7 +138,7 @@ def scatter_program(start: str) -> Program:
             ("FLOAT", "offset_size"),
             ("FLOAT", "clear_roughness"),
             ("FLOAT", "first_rays"),
-            ("FLOAT", "share"),
+            ("FLOAT", "ray_share"),
             ("INT", "way"),
             ("INT", "photons_shine"),
         ),
@@ -202,7 +200,7 @@ def guide_program(transmission: bool) -> Program:
         "what reflections show",
         "hits/guide.frag.glsl",
         textures=(*SURFACE_TEXTURES, ("RGBA32F", "met_path")),
-        constants=(("FLOAT", "shaded_roughness"), ("FLOAT", "share")),
+        constants=(("FLOAT", "shaded_roughness"), ("FLOAT", "ray_share")),
         defines=(("TRANSMISSION", "1"),) if transmission else (),
         outputs=(("VEC4", "out_shown"), *((("VEC4", "out_through"),) if transmission else ())),
     )
@@ -371,7 +369,7 @@ class ShadedReflections(Technique, BothWays):
         places = self._places(frame)
 
         def follow(way: int, turns: Turns, rays: images.Target, onward: images.Target, point: dict) -> Iterator[None]:
-            first = {**reach, "share": 1.0 / places}
+            first = {**reach, "ray_share": 1.0 / places}
             start, seen = ELSEWHERE if point else OWN, surface_bindings(frame)
             self._scatter(frame, rays, first, 0, frame.images[MARKS], seen, start, point, way)
             yield
@@ -535,7 +533,7 @@ class ShadedReflections(Technique, BothWays):
                 blend="ADDITIVE_PREMULT",
                 where=MET,
                 textures={**closure_bindings(closures), "met_path": rays.colors[2]},
-                constants={"shaded_roughness": reach["shaded_roughness"], "share": reach["share"]},
+                constants={"shaded_roughness": reach["shaded_roughness"], "ray_share": reach["ray_share"]},
             )
             frame.count(self, "passes")
 

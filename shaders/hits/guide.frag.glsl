@@ -1,6 +1,6 @@
 // What reflections show, and what is seen through glass, for whoever filters them: how much surfaces behind the lobe
 // reflect, as it is seen in it, and in w
-// the square of its luminance, both times the `share` of the rays. The mean over samples, and how uncertain that is, tell one part of a reflection from
+// the square of its luminance, both times the `ray_share` of the rays. The mean over samples, and how uncertain that is, tell one part of a reflection from
 // another.
 #include "lib/gbuffer.glsl"
 #include "hits/path.glsl"
@@ -26,9 +26,9 @@ void main()
   Surface s = SURFACE_READ(pixel);
   bool goes_on = lobe_goes_on(s);
   vec3 of_lobe = (s.kind == FRESNEL_DIELECTRIC || goes_on) ? vec3(0.0) : s.glossy_weight;
-  vec3 color = min(path.rgb / share, vec3(1.0)) * (s.diffuse + of_lobe + min(s.emission, vec3(1.0)));
+  vec3 color = min(path.rgb / ray_share, vec3(1.0)) * (s.diffuse + of_lobe + min(s.emission, vec3(1.0)));
   float bright = luminance(color);
-  vec4 shown = is_finite(bright) ? share * vec4(color, bright * bright) : vec4(0.0);
+  vec4 shown = is_finite(bright) ? ray_share * vec4(color, bright * bright) : vec4(0.0);
 #ifdef TRANSMISSION
   out_through = path_is_glossy(code) ? vec4(0.0) : shown;
 #endif

@@ -7,7 +7,7 @@
 // pictures of many samples go without way 2 and leave it to chance. Way 1 is that of thin coats above other lobes, too.
 //
 // ELSEWHERE: from what `point` shows, drawn at another point of the pixel, where that is the same surface; of the pixel's own
-// colours, as light that is found belongs to those. `share`: of all points' rays.
+// colours, as light that is found belongs to those. `ray_share`: of all points' rays.
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
@@ -96,7 +96,7 @@ void main()
 #else
   vec3 viewer = TO_VIEWER(s);
   float width = view_pixel() * view_growth(s.position);
-  vec3 throughput = vec3(share);
+  vec3 throughput = vec3(ray_share);
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
   bool clear = true;
   int mirrored = 0;

@@ -1,10 +1,12 @@
 // Irradiance at the points that gather for their groups, from their micro-buffers. WAYS: and `out_way`, the mean direction that it
 // comes from, times its luminance.
 #include "lib/math.glsl"
+#if defined(WAYS) || defined(PLACES)
+#include "micro/gathering.glsl"
+#include "lib/random.glsl"
+#endif
 #ifdef WAYS
 #include "micro/gathering_frame.glsl"
-#elif defined(PLACES)
-#include "micro/gathering.glsl"
 #endif
 #define NOTHING 0xffffffffu
 #define MICRO_WORD(texel) (micro_fetch(texel).x)
