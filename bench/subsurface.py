@@ -478,11 +478,25 @@ def page(rows: list[tuple[str, ...]], size: tuple[int, int], reference: int) -> 
     ])  # fmt: skip
 
 
+def with_others(page: str, rows: list[tuple[str, ...]], size: tuple[int, int], reference: int) -> list[tuple[str, ...]]:
+    """These rows in the place of the page's of the same scene and method, whose others stay; if the page's are of other
+    pictures, these alone."""
+    if page_through([], size, reference).partition("\n\n")[0] not in page:
+        return rows
+    kept: dict[tuple[str, ...], list] = {}
+    for row in markdown.rows_of(page, COMMAND, HEAD):
+        kept.setdefault(tuple(row[:2]), []).append(tuple(row))
+    for key in dict.fromkeys(row[:2] for row in rows):
+        kept[key] = [row for row in rows if row[:2] == key]
+    return [row for of_scene in kept.values() for row in of_scene]
+
+
 def page_through(rows: list[tuple[str, ...]], size: tuple[int, int], reference: int) -> str:
     """The same of light that comes through: means by channel, and no summary."""
     return "\n".join([
         f"Pictures of {size[0]} x {size[1]} pixels, two bounces (of milk 16, in glass 16), against two renders of",
         f"{reference} samples by Cycles whose noise is taken off the errors; means of red, green and blue.", "",
+        "A run of some scenes or methods leaves the rows of the others as an earlier version made them.", "",
         markdown.table([HEAD, *rows]),
     ])  # fmt: skip
 
@@ -554,6 +568,8 @@ def table_of(options: argparse.Namespace) -> int:
             if options.equal:
                 print(table([EQUAL_HEAD, *equal(added)]), flush=True)
             elif options.page:
-                text = (page_through if through else page)(rows, options.size, options.reference)
+                shown = options.size, options.reference
+                every = with_others(options.page.read_text(encoding="utf-8"), rows, *shown) if through else rows
+                text = (page_through if through else page)(every, *shown)
                 markdown.put_between(options.page, COMMAND if through else COMMAND_OPAQUE, text)
     return 0
