@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 import weakref
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -38,12 +39,31 @@ _FORMATS |= dict.fromkeys(("RGBA32UI", "R32UI"), "UINT_2D")
 _SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D", *_FORMATS}
 MOST_TEXTURES = 16  # of a program
 _MOST_IMAGES = 8  # that Blender binds at once
-_CONSTANTS = {"FLOAT", "VEC2", "VEC3", "VEC4", "INT", "IVEC2", "IVEC4", "MAT4", "BOOL"}
-_PUSH_BYTES = {"FLOAT": 4, "VEC2": 8, "VEC3": 16, "VEC4": 16, "INT": 4, "IVEC2": 8, "IVEC4": 16, "MAT4": 64, "BOOL": 4}
+_PUSH_BYTES = {"FLOAT": 4, "VEC2": 8, "VEC3": 12, "VEC4": 16, "INT": 4, "IVEC2": 8, "IVEC4": 16, "MAT4": 64, "BOOL": 4}
+_MOST_PUSH_BYTES = 128  # that every Vulkan driver has; of more, Blender complains
 
 
 class ShaderError(RuntimeError):
     """A shader that does not compile, or a binding that the program does not declare."""
+
+
+def push_bytes(kinds: Iterable[str]) -> int:
+    """Bytes that constants of these types, in this order, take as push constants.
+
+    Counted as Blender does before it prints that they are too many (`constants_calc_size` in
+    source/blender/python/gpu/gpu_py_shader_create_info.cc): never fewer than std430 needs, and up to some 30 % more.
+    """
+    total = last = 0
+    for kind in kinds:
+        size, padding = _PUSH_BYTES[kind], 0
+        if last not in (0, size):
+            pack = 8 if size == 8 else 16
+            padding = pack - last % pack if last < size else total % pack
+        elif size == 12:
+            padding = 4
+        total += padding + size
+        last = size
+    return total + total % 16
 
 
 @dataclass(frozen=True)
@@ -82,11 +102,13 @@ class Program:
             if kind not in _SAMPLERS:
                 raise ShaderError(f"Program {self.name}: texture '{name}' has the unknown type {kind}.")
         for kind, name in self.constants:
-            if kind not in _CONSTANTS:
+            if kind not in _PUSH_BYTES:
                 raise ShaderError(f"Program {self.name}: constant '{name}' has the unknown type {kind}.")
-        size = sum(_PUSH_BYTES[kind] for kind, _ in self.constants)
-        if size > 128:
-            raise ShaderError(f"Program {self.name}: {size} bytes of constants; above 128 put them into a block.")
+        size = push_bytes(kind for kind, _ in self.constants)
+        if size > _MOST_PUSH_BYTES:
+            raise ShaderError(
+                f"Program {self.name}: {size} bytes of constants; above {_MOST_PUSH_BYTES} put them into a block."
+            )
         if len(self.textures) > MOST_TEXTURES:
             raise ShaderError(f"Program {self.name}: {len(self.textures)} textures; Metal allows {MOST_TEXTURES}.")
         if bool(self.compute) == bool(self.fragment):

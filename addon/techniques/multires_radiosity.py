@@ -43,12 +43,11 @@ from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..kernels import lists
 from ..lighting.asked import asked, lit_at_hits
-from ..lighting.virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
+from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, TRACED, BoundGather, Gather, VirtualLightSet
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import ANY_SURFACE, MARKS, surface_bindings
 from .instant_radiosity import (
-    GATHER_CONSTANTS,
     GATHER_TEXTURES,
     InstantRadiosity,
     gather_bindings,
@@ -124,6 +123,9 @@ PULL = _fill("split regions from finer ones", ("finer_flags", "finer_irradiance"
 FILL = _fill("regions from coarser ones", ("coarser_flags", "coarser_irradiance", "pulled"))
 
 
+REGION_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("FLOAT", "near_radius"))  # of GATHER_CONSTANTS
+
+
 @cache
 def regions(gather: Gather, listed: bool = True) -> Program:
     """The gather of regions, those of the list or those of one level, with what tells which lights are hidden."""
@@ -138,7 +140,7 @@ def regions(gather: Gather, listed: bool = True) -> Program:
         textures=(*GATHER_TEXTURES, *textures, *gather.textures),
         images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"),),
         blocks=PATH_BLOCKS,
-        constants=(*GATHER_CONSTANTS, *GRID, ("INT", "first_row"), *constants, *gather.constants),
+        constants=(*REGION_CONSTANTS, *GRID, ("INT", "first_row"), *constants, *gather.constants),
         snippets=(("generated/gather", f'#include "{gather.file}"\n'),),
         defines=(*RUNS, *gather.defines, *(() if listed else (("BY_LEVEL", ""),))),
         group=(lists.RUN, 1, 1),
@@ -313,7 +315,7 @@ class MultiresRadiosity(InstantRadiosity):
         columns = lists.columns(frame.size, 8)
         textures = bindings["textures"] | bound.textures | listed
         program = asked(frame, regions(bound.gather), textures)
-        constants = bindings["constants"] | bound.constants | grid | {"columns": columns}
+        constants = _region_constants(bindings, bound, grid) | {"columns": columns}
         for first, last in frame.bands(self, "regions"):
             passes.compute(
                 program, (columns, last - first), textures=textures, images={"gathered": atlas},
@@ -333,7 +335,7 @@ class MultiresRadiosity(InstantRadiosity):
             textures |= bindings["textures"] | bound.textures
             textures["region_flags"] = flags[level - 1] if level > 0 else anything
             textures["coarser_flags"] = flags[level] if level < levels else anything
-            constants = bindings["constants"] | bound.constants | grid | {"level": level, "levels": levels}
+            constants = _region_constants(bindings, bound, grid) | {"level": level, "levels": levels}
             for first, last in frame.bands(self, "regions") if level == 0 else ((0, height),):
                 last = height if last == frame.size[1] else last  # the grid is shifted, and has more rows
                 passes.compute(
@@ -341,6 +343,10 @@ class MultiresRadiosity(InstantRadiosity):
                     blocks=bindings["blocks"], constants={**constants, "first_row": first},
                 )  # fmt: skip
                 yield
+
+
+def _region_constants(bindings: dict[str, dict], bound: BoundGather, grid: dict) -> dict[str, object]:
+    return {name: bindings["constants"][name] for _, name in REGION_CONSTANTS} | bound.constants | grid
 
 
 def fitting_levels(size: tuple[int, int], asked: int) -> int:

@@ -1,12 +1,16 @@
 """The shader library: includes, declarations, errors that name file and line, and the cache."""
 
+import ctypes
+import os
+import re
 import threading
 from dataclasses import replace
 
+import gpu
 import pytest
 
 from addon.gfx import context, library
-from addon.gfx.library import SHADER_ROOT, Program, ShaderError, resolve
+from addon.gfx.library import SHADER_ROOT, Program, ShaderError, push_bytes, resolve
 from addon.gfx.struct import Struct
 from tests.gfx.declared import programs
 
@@ -58,6 +62,10 @@ def test_an_unknown_include_is_an_error_that_names_the_file():
         ({"textures": (("CUBE", "sky"),)}, "texture 'sky' has the unknown type CUBE"),
         ({"constants": (("VEC7", "size"),)}, "constant 'size' has the unknown type VEC7"),
         ({"constants": tuple(("MAT4", f"m{k}") for k in range(3))}, "192 bytes of constants"),
+        (
+            {"constants": (*(("FLOAT", f"x{k}") for k in range(10)), ("MAT4", "m"), ("VEC4", "v"))},
+            "144 bytes of constants",
+        ),
         ({"textures": tuple(("FLOAT_2D", f"t{k}") for k in range(17))}, "17 textures; Metal allows 16"),
         ({"fragment": "x"}, "give either compute, or vertex and fragment"),
     ],
@@ -65,6 +73,21 @@ def test_an_unknown_include_is_an_error_that_names_the_file():
 def test_a_declaration_that_cannot_work_is_refused_before_it_is_compiled(changes, sentence):
     with pytest.raises(ShaderError, match=sentence):
         replace(compute_program(), **changes)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the C library that Blender prints by is not the process's own")
+@pytest.mark.parametrize(
+    "kinds", [("FLOAT", "VEC3"), ("INT", "IVEC2", "VEC3", "VEC3", "FLOAT"), ("VEC2", "INT", "MAT4")]
+)
+def test_constants_take_as_many_bytes_as_blender_says_where_they_are_too_many(kinds, capfd):
+    info = gpu.types.GPUShaderCreateInfo()
+    kinds = kinds * 8
+    for k, kind in enumerate(kinds):
+        info.push_constant(kind, f"constant_{k}")
+    ctypes.CDLL(None).fflush(None)  # what C printed
+    told = [int(size) for size in re.findall(r"already reach (\d+) bytes", capfd.readouterr().out)]
+    sizes = [push_bytes(kinds[: k + 1]) for k in range(len(kinds))]
+    assert told == [size for size in sizes if size > 128]
 
 
 @pytest.fixture
