@@ -6,12 +6,13 @@ import pytest
 from mathutils import Matrix
 
 from addon.gfx import images
+from bench.shading import tree_of
 
 
 def shader(thing, **values):
     """A Principled material of these values on an object; its tree, node, and a function that adds linked nodes."""
     material = bpy.data.materials.new("odd")
-    tree = material.node_tree
+    tree = tree_of(material)
     node = next(one for one in tree.nodes if one.type == "BSDF_PRINCIPLED")
     for name, value in values.items():
         node.inputs[name.replace("_", " ")].default_value = value
@@ -42,7 +43,8 @@ def bumped_glass_in_fog(scene, cube):
     inside = into(tree, "ShaderNodeVolumeAbsorption", tree.nodes["Material Output"].inputs["Volume"])
     inside.inputs["Density"].default_value = 2.0
     world = scene.world = bpy.data.worlds.new("fog")
-    into(world.node_tree, "ShaderNodeVolumeScatter", world.node_tree.nodes["World Output"].inputs["Volume"])
+    fog = tree_of(world)
+    into(fog, "ShaderNodeVolumeScatter", fog.nodes["World Output"].inputs["Volume"])
 
 
 def anisotropic_film_over_skin(scene, cube):
@@ -134,9 +136,12 @@ def test_draft_of_an_odd_scene_is_drawn(scene, region, odd):
     region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.01}
     for k in range(2):
         region.viewport.dirty, region.camera = True, region.moved(0.02 * k)
-        picture = region.draw()
-        while not region.viewport.frame.samples_done:
+        for _ in range(100):
             picture = region.draw()
+            if region.viewport.frame.samples_done:
+                break
+        else:
+            pytest.fail("The draft was not there after 100 redraws.")
     assert region.viewport.scale > 1
     for image in (picture, region.viewport.display.shown):
         shown = images.read(image)
