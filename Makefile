@@ -19,7 +19,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 .PHONY: help environment demo pictures samples test test-all test-more test-fast test-vulkan stress check matrix mutations package site test-window screenshots window-walk nodes pages bench bench-references bench-quick bench-viewport bench-beside clean
 
 help: ## this list
-	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
+	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5] [COMPILE=quick: a software GPU compiles faster]"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1@\2/p' Makefile | column -t -s @
 
 environment: ## the virtual environment, with Blender as a Python module

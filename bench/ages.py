@@ -59,9 +59,14 @@ def git(*arguments: str) -> str | None:
     return done.stdout.strip() if done.returncode == 0 else None
 
 
+def commit() -> str:
+    """Of the working tree, as rows of tables name it; empty outside of a clone."""
+    return git("rev-parse", "--short=10", "HEAD") or ""
+
+
 def now() -> str:
     """The sentence that a page carries which is made now; empty outside of a clone."""
-    return stamp(dt.datetime.now(dt.UTC).strftime("%Y-%m-%d"), git("rev-parse", "--short=10", "HEAD") or "")
+    return stamp(dt.datetime.now(dt.UTC).strftime("%Y-%m-%d"), commit())
 
 
 def stamp(date: str, commit: str) -> str:

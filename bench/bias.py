@@ -13,6 +13,7 @@ import argparse
 
 import numpy as np
 
+from bench import ages
 from bench.bright import luminance
 from bench.cells import ROOT
 from bench.flicker import bias_of, opened
@@ -23,9 +24,10 @@ COMMAND = "python -m bench bias --page"
 PAGE = ROOT / "docs" / "flicker.md"
 SCENES = ("window_interior", "cornell_box", "hdri_product", "colonnade_hall", "meadow", "soft_shadow_garden")
 SAMPLES = (1, 2, 4, 16)
+SIZE = (96, 72)
 LEAST = 0.01  # of the picture's light
 FULL, FEWEST = 4, 3
-HEAD = ("scene", "light path", "share", "noise of the truth", *map(str, SAMPLES))
+HEAD = ("scene", "light path", "share", "noise of the truth", *map(str, SAMPLES), "commit")
 
 
 def seeds_of(samples: int, seeds: int) -> int:
@@ -41,7 +43,7 @@ def lights(combined: np.ndarray, paths: dict[str, np.ndarray]) -> dict[str, floa
 def rows_of_scene(
     name: str, found: dict[int, list[dict[str, float]]], truth: dict[str, float], noise: dict[str, float]
 ):
-    """Table rows. `found`: by number of samples the means by light path of each seed."""
+    """Table rows, without the commit. `found`: by number of samples the means by light path of each seed."""
     for path, light in truth.items():
         if light >= LEAST * truth["combined"]:
             ratios = [bias_of([one.get(path, 0.0) / light for one in found[n]]) if n in found else "" for n in SAMPLES]
@@ -57,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", nargs="+", type=int, default=list(SAMPLES), choices=SAMPLES)
     parser.add_argument("--seeds", type=int, default=8)
     parser.add_argument("--reference", type=int, default=512, help="samples of each of two renders by Cycles")
-    parser.add_argument("--size", type=size_of, default=(96, 72), metavar="WxH")
+    parser.add_argument("--size", type=size_of, default=SIZE, metavar="WxH")
     parser.add_argument("--page", action="store_true", help=f"write the table into docs/{PAGE.name}")
 
 
@@ -68,6 +70,8 @@ def command(options: argparse.Namespace) -> int:
     from addon.compare.passes import light_paths
     from addon.compare.reference import reference, render_passes
 
+    if options.page and (set(options.samples), options.size) != (set(SAMPLES), SIZE):
+        raise ValueError(f"Rows of {PAGE.name} are of {SAMPLES} samples and {SIZE} pixels: leave --page out.")
     addon.register()
     rows: list[list[str]] = []
     for scene in options.scenes:
@@ -81,7 +85,7 @@ def command(options: argparse.Namespace) -> int:
             seeds = range(1, 1 + seeds_of(samples, options.seeds))
             made = (render_passes(opened_scene, "CANDELA", samples, seed, size=options.size) for seed in seeds)
             found[samples] = [lights(one.images["combined"], light_paths(one.images)) for one in made]
-        rows += rows_of_scene(shown_as, found, truth, noise)
+        rows += ([*row, ages.commit()] for row in rows_of_scene(shown_as, found, truth, noise))
         print(table([HEAD, *(row for row in rows if row[0] == shown_as)]), flush=True)
         if options.page:
             measured = {row[0] for row in rows}

@@ -5,8 +5,8 @@ of its 3x3, are FIVE times darker (a small lamp stands alone in both). Such a pi
 then counts for all that was missed; glare makes a star of it. Said of each is the light path that most of what it has
 more than its surroundings came by. Truth is rendered only where surroundings tell of some. Pictures of ten pages
 (sample files and scenes of glare), the scenes of `bench reflections`, and paths of .blend files. `--before CHECKOUT`
-counts them in the pictures of an older working tree, too. `--page` writes docs/reflections.md's table; rows of others
-stay.
+counts them in the pictures of an older working tree, too, and writes no page. `--page` writes docs/reflections.md's
+table; rows of others stay.
 """
 
 from __future__ import annotations
@@ -24,12 +24,11 @@ from bench.cells import ROOT
 
 PAGE = ROOT / "docs" / "reflections.md"
 COMMAND = "python -m bench bright --page"
-HEAD = ["scene", "by surroundings", "and truth", "of"]
-BEFORE_COMMAND = "python -m bench bright --before CHECKOUT --page"
-BEFORE_HEAD = ["scene", "before", "now", "of"]
+HEAD = ["scene", "by surroundings", "and truth", "of", "commit"]
+BEFORE_HEAD = ["scene", "before", "now", "of", "commit"]
 FIVE = 5.0
 LEAST = 0.02  # of the picture's mean: below it nobody sees a pixel
-SIZE = (128, 96)
+SAMPLES, SIZE = 16, (96, 72)
 FILES = (
     "caustics_table", "caustics_rings", "emissive_lamp", "hdri_product", "window_interior", "cornell_box",
     "soft_shadow_garden",
@@ -39,7 +38,7 @@ BUILT = ("street", "candle", "car")  # of bench/glare_scenes.py
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenes", nargs="*", help="by name, or paths of .blend files; without: all")
-    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--samples", type=int, default=SAMPLES)
     parser.add_argument("--truth-samples", type=int, default=512, help="of Cycles")
     parser.add_argument("--size", default="x".join(map(str, SIZE)), help="pixels")
     parser.add_argument("--before", type=Path, metavar="CHECKOUT", help="a working tree of an older commit, to compare")
@@ -53,9 +52,11 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     size = tuple(int(side) for side in options.size.split("x"))
+    if options.page and (options.before or (options.samples, size) != (SAMPLES, SIZE)):
+        raise ValueError(f"{PAGE.name} has {SAMPLES} samples, {SIZE} pixels and nothing of --before: leave --page out.")
     older = Version(options.before) if options.before else None
-    command, head = (BEFORE_COMMAND, BEFORE_HEAD) if older else (COMMAND, HEAD)
-    rows = markdown.rows_of(PAGE.read_text(encoding="utf-8"), command, head) if options.page else []
+    head = BEFORE_HEAD if older else HEAD
+    rows = markdown.rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, head) if options.page else []
     for name in options.scenes or (*FILES, *BUILT, *reflection_scenes.SCENES, *glass_scenes.SCENES):
         scene = _opened(name)
         before = luminance(_by(older, options.samples, size)) if older else None
@@ -67,7 +68,7 @@ def command(options: argparse.Namespace) -> int:
             truth = luminance(render_passes(scene, "CYCLES", options.truth_samples, 1, size=size).images["combined"])
             found, stood = wrong(light, truth), wrong(before, truth) if older else stood
         counts = [str(int(one.sum())) for one in ((stood, found) if older else (alone, found))]
-        row = [name, *counts, _told(came_by(images, found))]
+        row = [name, *counts, _told(came_by(images, found)), ages.commit()]
         rows = [*(one for one in rows if one[0] != name), row]
         print("  ".join(row), flush=True)
         sums = [sum(int(one[k]) for one in rows) for k in (1, 2)]
@@ -75,7 +76,7 @@ def command(options: argparse.Namespace) -> int:
         told = f"{sums[0]} before, at commit {commit}, {sums[1]} now" if older else str(sums[1])
         text = f"Isolated bright pixels: {told}.\n\n{markdown.table([head, *rows])}"
         if options.page:
-            markdown.put_between(PAGE, command, text)
+            markdown.put_between(PAGE, COMMAND, text)
     print(text)
     if older:
         older.end()

@@ -33,8 +33,6 @@ from .study import size, size_of
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
-FEW_COMMAND = "python -m bench reflections --few --page"
-LARGE_COMMAND = "python -m bench reflections --few --size 256x192 --page"
 SMALL = "64x48"
 NOISE, NO_TRUTH = "noise of the truth", 0.02  # above it Cycles has not found the light, and nothing is compared in time
 FEW_HEAD = [
@@ -111,10 +109,20 @@ def command(options: argparse.Namespace) -> int:
     return 0
 
 
+def few_command(options: argparse.Namespace) -> str:
+    """What writes the tables of `--few` of pictures of this size beside references of so many samples."""
+    width, height = options.size
+    sized = "" if options.size == size_of(SMALL) else f" --size {width}x{height}"
+    return f"python -m bench reflections --few{sized} --reference {options.reference} --page"
+
+
 def _few(order: list[str], options: argparse.Namespace) -> None:
     """Both tables of `--few`. On the page the rows of scenes that were not asked for stay."""
-    page, small = PAGE.read_text(encoding="utf-8"), options.size == size_of(SMALL)
-    command = FEW_COMMAND if small else LARGE_COMMAND
+    page, command, small = PAGE.read_text(encoding="utf-8"), few_command(options), options.size == size_of(SMALL)
+    if options.page and markdown.begin(command) not in page:
+        raise ValueError(
+            f"{PAGE.name} has no tables of `{command}`, so pictures of that size or reference have no place there."
+        )
     rows, equal = (
         {one[0]: one for one in markdown.rows_of(page, command, head)} for head in (FEW_HEAD, equal_time.head(SAMPLES))
     )
@@ -159,7 +167,7 @@ def _few_of(name: str, options: argparse.Namespace) -> tuple[list[str], equal_ti
         name, *(f"{errors[one]:.4f}" for one in ours), f"{pictures[last].mean() / truth.mean():.3f}", f"{noise:.4f}",
         f"{path} ({share:.2f})", f"{mean:.3f}", str(int(alone.sum())),
         ", ".join(f"{found[one][1]:.1f}" for one in ours), f"{errors[cycles]:.4f}", f"{found[cycles][1]:.1f}",
-        ages.git("rev-parse", "--short=10", "HEAD") or "",
+        ages.commit(),
     ], [(one.engine, seconds, errors[one]) for one, (_, seconds) in found.items()]  # fmt: skip
 
 

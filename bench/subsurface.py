@@ -20,7 +20,7 @@ from time import process_time
 
 import numpy as np
 
-from . import markdown
+from . import ages, markdown
 from .quick import size_of, table
 from .shading import even_world, node_of, one_shader
 
@@ -36,6 +36,7 @@ ENTRANTS = (
 )  # fmt: skip
 LABELS = {"CANDELA": "Candela", "BLENDER_EEVEE": "EEVEE", "CYCLES": "Cycles", DENOISED: "Cycles denoised"}
 HEAD = ("scene", "method", "renderer", "relMSE", "mean / Cycles", "processor s", "noise of the reference")
+THROUGH_HEAD = (*HEAD, "commit")  # rows of a page may be of several
 
 
 def material(method: str, color, radius, scale: float):
@@ -484,7 +485,7 @@ def with_others(page: str, rows: list[tuple[str, ...]], size: tuple[int, int], r
     if page_through([], size, reference).partition("\n\n")[0] not in page:
         return rows
     kept: dict[tuple[str, ...], list] = {}
-    for row in markdown.rows_of(page, COMMAND, HEAD):
+    for row in markdown.rows_of(page, COMMAND, THROUGH_HEAD):
         kept.setdefault(tuple(row[:2]), []).append(tuple(row))
     for key in dict.fromkeys(row[:2] for row in rows):
         kept[key] = [row for row in rows if row[:2] == key]
@@ -492,12 +493,11 @@ def with_others(page: str, rows: list[tuple[str, ...]], size: tuple[int, int], r
 
 
 def page_through(rows: list[tuple[str, ...]], size: tuple[int, int], reference: int) -> str:
-    """The same of light that comes through: means by channel, and no summary."""
+    """The same of light that comes through: means by channel, the commit of each row, and no summary."""
     return "\n".join([
         f"Pictures of {size[0]} x {size[1]} pixels, two bounces (of milk 16, in glass 16), against two renders of",
         f"{reference} samples by Cycles whose noise is taken off the errors; means of red, green and blue.", "",
-        "A run of some scenes or methods leaves the rows of the others as an earlier version made them.", "",
-        markdown.table([HEAD, *rows]),
+        markdown.table([THROUGH_HEAD, *rows]),
     ])  # fmt: skip
 
 
@@ -564,7 +564,7 @@ def table_of(options: argparse.Namespace) -> int:
         for method in options.methods:
             added = lines(name, method, options.size, options.reference, options.pictures, entrants)
             print(table([HEAD, *added]), flush=True)
-            rows += added
+            rows += [(*row, ages.commit()) for row in added] if through else added
             if options.equal:
                 print(table([EQUAL_HEAD, *equal(added)]), flush=True)
             elif options.page:

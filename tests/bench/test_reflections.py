@@ -1,11 +1,13 @@
-"""What carries an error, and the shapes that scenes of mirrors and glass are made of."""
+"""What carries an error, where rows stand, and the shapes that scenes of mirrors and glass are made of."""
+
+import argparse
 
 import bpy
 import numpy as np
 import pytest
 
 from addon.compare.cache import Reference
-from bench import glass_scenes, reflection_scenes, reflection_truth, reflections, shapes
+from bench import glass_scenes, markdown, reflection_scenes, reflection_truth, reflections, shapes
 from bench.shading import glass
 
 
@@ -20,6 +22,18 @@ def test_the_error_is_carried_by_the_path_that_differs():
     found = _passes(diffuse_direct=1.01, glossy_indirect=0.75, emission=0.0)
     path, share, mean = reflections.carrier(found, truth)
     assert (path, share, mean) == ("glossy indirect", pytest.approx(0.25 / 0.26), pytest.approx(1.5))
+
+
+def test_rows_of_another_size_or_reference_are_not_mixed_into_a_section():
+    def options(size, reference=256):
+        return argparse.Namespace(size=size, reference=reference, page=True, only=["softbox"])
+
+    page = reflections.PAGE.read_text(encoding="utf-8")
+    for size in ((64, 48), (256, 192)):
+        assert markdown.begin(reflections.few_command(options(size))) in page
+    for other in (options((128, 96)), options((64, 48), 1024)):
+        with pytest.raises(ValueError, match=r"reflections\.md has no tables of"):
+            reflections._few([], other)
 
 
 def test_balls_and_turned_bodies_face_outwards_and_are_closed(registered):

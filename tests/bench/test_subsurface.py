@@ -36,14 +36,17 @@ def test_noise_and_bias_are_told_apart_whatever_the_noise_of_the_references():
 
 
 def test_a_run_of_one_scene_leaves_the_rows_of_others(tmp_path):
-    def rows(scene, error):
-        return [(scene, "BURLEY", f"Candela {n}", error, "1.000 1.000 1.000", "0.10", "0.0010") for n in (1, 16)]
+    """Which keep the commit at which they were made."""
+
+    def rows(scene, error, commit="0123456789"):
+        cells = ("1.000 1.000 1.000", "0.10", "0.0010", commit)
+        return [(scene, "BURLEY", f"Candela {n}", error, *cells) for n in (1, 16)]
 
     file = tmp_path / "page.md"
     file.write_text(f"{markdown.begin(subsurface.COMMAND)}\n{markdown.END}\n")
     size, reference = (32, 24), 256
     before = [*rows("ears", "0.5000"), *rows("grapes", "0.0400")]
     markdown.put_between(file, subsurface.COMMAND, subsurface.page_through(before, size, reference))
-    page, again = file.read_text(), rows("ears", "0.2000")
+    page, again = file.read_text(), rows("ears", "0.2000", "abcdef0123")
     assert subsurface.with_others(page, again, size, reference) == [*again, *before[2:]]
     assert subsurface.with_others(page, again, (64, 48), reference) == again
