@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+
+from addon.whole_files import replacing
 
 END = "<!-- end of what is written -->"
 
 
 def write_whole(path: Path, text: str) -> None:
     """Replace the file at once: whoever reads or interrupts finds the old text or the new one."""
-    path = path.resolve()
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".writing_")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with replacing(path.resolve()) as file:
+        file.write(text.encode())
 
 
 def begin(command: str) -> str:

@@ -25,14 +25,15 @@ DATA = ("materials", "snapshot.scene", "snapshot.panorama")
 BELOW_FRAME = ("gfx", "sampling", "kernels", "scene", "sources", *DATA)
 ON_A_FRAME = ("surfaces", "film", "lighting")  # pieces that techniques share, each on those before it
 BELOW_TECHNIQUES = (*BELOW_FRAME, "eye", "frame", "grass", *ON_A_FRAME)
-BELOW_COMPARE = (*BELOW_TECHNIQUES, "materials", "snapshot", "techniques")
+BELOW_COMPARE = (*BELOW_TECHNIQUES, "materials", "snapshot", "techniques", "whole_files")
 BLENDER = ("bpy", "bpy_extras", "imbuf", "mathutils", "bl_math", "idprop", "numpy")
 
 # The longest name that fits is the one that counts: gfx.context has its own line, the rest of gfx another.
 ROOMS = {
+    "whole_files": Room(),
     "gfx": Room(modules=("gpu", "gpu_extras", "numpy")),
     "gfx.context": Room(modules=("bpy", "gpu")),
-    "gfx.user_folder": Room(modules=("bpy",)),
+    "gfx.user_folder": Room(rooms=("whole_files",), modules=("bpy",)),
     "materials": Room(modules=("numpy",)),
     "materials.reader": Room(modules=BLENDER),
     "snapshot": Room(rooms=("materials",), modules=BLENDER, optional=("openvdb",)),
@@ -43,7 +44,7 @@ ROOMS = {
     "eye": Room(modules=("numpy",)),
     "eye.point_spread": Room(rooms=("gfx", "kernels"), modules=("numpy",)),
     "eye.scatter": Room(rooms=("gfx", "kernels"), modules=("numpy",)),
-    "grass": Room(modules=("numpy",)),
+    "grass": Room(rooms=("whole_files",), modules=("numpy",)),
     "grass.generate": Room(rooms=("snapshot",), modules=BLENDER),
     "scene": Room(rooms=("gfx", "sampling", "kernels", *DATA), modules=("numpy",)),
     "sources": Room(rooms=("gfx", "sampling", "kernels", "scene", *DATA), modules=("numpy",)),

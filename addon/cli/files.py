@@ -9,12 +9,14 @@ import os
 import platform
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from .refused import Refused, reason
 
 WRITING = ".writing_"  # how the names of folders begin whose files are not in place yet
+ABANDONED_S = 7 * 24 * 3600.0  # no picture takes so long of which nothing is written meanwhile
 BOOT = Path("/proc/sys/kernel/random/boot_id")
 MOST_MARKED = 1 << 16  # letters of a file in which its mark stands
 BLEND_STARTS = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # plain, compressed by zstd, by gzip (before 3.0)
@@ -86,11 +88,24 @@ def _stands(path: Path) -> bool:
 
 
 def clear_abandoned(folder: Path) -> None:
-    """Delete what processes of this machine were writing there when they were killed."""
-    for place in folder.glob(f"{WRITING}{_machine()}_*"):
-        pid = place.name.removeprefix(WRITING).split("_")[1]
-        if os.name == "posix" and pid.isdigit() and not _lives(int(pid)):  # elsewhere asking would end the process
+    """Delete what processes were writing there when they were killed: of this machine, as long as it is not started
+    anew, at once; of any other, which cannot be asked, what has not been written to for a week."""
+    for place in folder.glob(f"{WRITING}*_*_*"):
+        machine, pid, _ = place.name.removeprefix(WRITING).split("_", 2)
+        if not pid.isdigit() or place.is_symlink() or not place.is_dir():  # not of this kind
+            continue
+        # To ask elsewhere than on POSIX would end the process.
+        asked = os.name == "posix" and machine == _machine()
+        if not _lives(int(pid)) if asked else _idle_s(place) > ABANDONED_S:
             shutil.rmtree(place, ignore_errors=True)
+
+
+def _idle_s(folder: Path) -> float:
+    """Since something in the folder was written; 0 where that cannot be told."""
+    try:
+        return time.time() - max(one.lstat().st_mtime for one in (folder, *folder.rglob("*")))
+    except OSError:
+        return 0.0
 
 
 def _lives(pid: int) -> bool:

@@ -13,27 +13,17 @@ import contextlib
 import json
 import os
 import stat
-import tempfile
-import time
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ..whole_files import DAMAGED, clear_abandoned, replacing
 from .passes import light_paths
 
 LIMIT_BYTES = 2 << 30
 FOLDER = "candela_references"  # below the folder that is named
 MARK = "candela_"  # how names of entries begin
-WRITING = ".writing_candela_"  # how names of entries begin that some process is writing
-ABANDONED_S = 24 * 3600.0  # an entry that is being written for so long belongs to a process that was ended
-# What reading a damaged zip of arrays raises, from its table, its packed bytes, or the head of an array.
-DAMAGED = (
-    zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, MemoryError,
-    OSError, TypeError,
-)  # fmt: skip
 HALF_MAX = 65504.0  # largest float16: the half difference is kept in 16 bits, it only measures noise
 
 
@@ -114,16 +104,10 @@ def save(folder: Path, reference: Reference) -> None:
     arrays = {f"image/{name}": pixels for name, pixels in reference.images.items()}
     for name, pixels in reference.half.items():
         arrays[f"half/{name}"] = np.clip(pixels, -HALF_MAX, HALF_MAX).astype(np.float16)
-    temporary, path = None, entry(folder, reference.key)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=WRITING, suffix=".npz")
-        with os.fdopen(handle, "wb") as file:
+        with replacing(entry(folder, reference.key), ".npz") as file:
             np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
-        Path(temporary).replace(path)
     except OSError as error:
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
         raise OSError(f"The reference could not be kept in {folder}: {error.strerror or error}.") from error
     make_room(folder)
 
@@ -135,15 +119,12 @@ def make_room(folder: Path, limit: int = LIMIT_BYTES) -> None:
     alone, unless that process must have ended long ago.
     """
     entries = []
+    clear_abandoned(folder / FOLDER)
     for path in (folder / FOLDER).glob("*.npz"):
         with contextlib.suppress(OSError):
             about = path.lstat()
-            if not stat.S_ISREG(about.st_mode):
-                continue
-            if path.name.startswith(MARK):
+            if stat.S_ISREG(about.st_mode) and path.name.startswith(MARK):
                 entries.append((about.st_mtime_ns, about.st_size, path))
-            elif path.name.startswith(WRITING) and time.time() - about.st_mtime > ABANDONED_S:
-                path.unlink()
     entries.sort(reverse=True)
     total = 0
     for number, (_, size, path) in enumerate(entries):

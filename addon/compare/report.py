@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import html
 import math
-import os
-import tempfile
 from pathlib import Path
 from string import Template
 
 import numpy as np
 
+from ..whole_files import replacing
 from .comparison import Comparison, Picture
 from .first_row import Shown
 from .metrics import EMPTY_DEPTH, PathError, display, figures, is_surface
@@ -48,20 +47,13 @@ def write_report(path: str | Path, data: Comparison) -> Path:
     """
     path = Path(path)
     text = page(data)
-    temporary = None
     try:
         _refuse_protected(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".writing_", suffix=".html")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).chmod(0o644)  # mkstemp lets only the owner read
-        Path(temporary).replace(path)
+        with replacing(path, ".html") as file:
+            file.write(text.encode())
     except ReportError:
         raise
     except OSError as error:
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
         raise ReportError(f"The report could not be written to {path}: {error.strerror or error}.") from error
     return path
 

@@ -9,10 +9,11 @@ import contextlib
 import json
 import os
 import sys
-import tempfile
 from pathlib import Path
 
 import bpy
+
+from ..whole_files import replacing
 
 MOST_BYTES = 1 << 20  # of a file of JSON
 
@@ -51,12 +52,5 @@ def kept(path: Path) -> dict:
 def keep(path: Path, content: dict) -> None:
     """Write such a file at once: whoever reads finds the old content or the new one. Where the folder cannot be written
     nothing is kept."""
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".writing_candela_")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                json.dump(content, file, indent=1)
-            Path(temporary).replace(path)
-        except OSError:
-            Path(temporary).unlink(missing_ok=True)
+    with contextlib.suppress(OSError), replacing(path) as file:
+        file.write(json.dumps(content, indent=1).encode())

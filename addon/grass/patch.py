@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import tempfile
 import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -20,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..whole_files import DAMAGED, replacing
 from .compression import LUMA, components, decoded, encoded, mean_ratio, white_of
 from .directions import Rings
 
@@ -214,25 +212,15 @@ def save(patch: Patch, path: Path) -> None:
 
 def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """A zip of arrays that is there whole or not at all. Raises PatchError."""
-    unfinished = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=".writing_candela_")
-        with (
-            os.fdopen(handle, "wb") as file,
-            zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed,
-        ):
+        with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
             for name, array in arrays.items():
                 content = io.BytesIO()
                 np.lib.format.write_array(content, np.ascontiguousarray(array), allow_pickle=False)
                 entry = zipfile.ZipInfo(f"{name}.npy")  # of 1980: equal patches are equal files
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 packed.writestr(entry, content.getvalue())
-        Path(unfinished).chmod(0o644)  # mkstemp lets only the owner read
-        Path(unfinished).replace(path)
     except OSError as error:
-        if unfinished:
-            Path(unfinished).unlink(missing_ok=True)
         raise PatchError(f"{path} could not be written: {error.strerror or error}.") from error
 
 
@@ -254,7 +242,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise
     except OSError as error:
         raise PatchError(f"{path} could not be read: {error.strerror or error}.") from error
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError) as error:
+    except DAMAGED as error:
         raise PatchError(f"{path} is no grass patch, or it is damaged.") from error
 
 

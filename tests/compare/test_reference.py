@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon import whole_files
 from addon.compare import beside, cache, reference
 from addon.compare.passes import PASS_NAMES, light_paths
 from addon.compare.reference import RenderFailed, render_passes
@@ -336,12 +337,12 @@ def test_the_oldest_references_make_room(tmp_path):
 
 def test_what_another_process_writes_is_left_alone(tmp_path):
     """Entries in the making are not counted and not deleted, unless their process was ended long ago."""
-    kept_file(tmp_path, f"{cache.WRITING}now.npz")
-    kept_file(tmp_path, f"{cache.WRITING}then.npz", age=2 * cache.ABANDONED_S)
+    kept_file(tmp_path, f"{whole_files.WRITING}now.npz")
+    kept_file(tmp_path, f"{whole_files.WRITING}then.npz", age=2 * whole_files.ABANDONED_S)
     kept_file(tmp_path, "candela_old.npz", age=60.0)
     kept_file(tmp_path, "candela_new.npz")
     cache.make_room(tmp_path, limit=150)
-    assert names(tmp_path) == [f"{cache.WRITING}now.npz", "candela_new.npz"]
+    assert names(tmp_path) == [f"{whole_files.WRITING}now.npz", "candela_new.npz"]
 
 
 def test_files_of_others_are_neither_counted_nor_deleted(tmp_path):

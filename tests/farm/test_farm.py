@@ -234,6 +234,22 @@ def test_what_another_machine_of_the_same_name_is_writing_stays(tmp_path, monkey
     assert not place.exists()
 
 
+def test_what_another_machine_or_this_one_before_its_restart_was_writing_goes_after_a_week(tmp_path):
+    """No process there can be asked. What a file was added to meanwhile is being written."""
+    old = time.time() - 1.1 * files.ABANDONED_S
+    names = {kind: f"{files.WRITING}0123abcd_{os.getpid()}_{kind}" for kind in ("a_b", "fresh", "growing")}
+    names |= {"mine": ".writing_of_mine_too", "alive": f"{files.WRITING}{files._machine()}_{os.getpid()}_x"}
+    for kind, name in names.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.exr").write_bytes(b"x")
+        if kind != "growing":
+            os.utime(tmp_path / name / "a.exr", (old, old))
+        if kind != "fresh":
+            os.utime(tmp_path / name, (old, old))
+    files.clear_abandoned(tmp_path)
+    assert {one.name for one in tmp_path.iterdir()} == {*names.values()} - {names["a_b"]}
+
+
 # -------------------------------------------------------------------------------------------------------------- bundles
 
 

@@ -9,6 +9,7 @@ import struct
 import threading
 import time
 import tracemalloc
+import zipfile
 from functools import partial
 from types import SimpleNamespace
 
@@ -147,6 +148,23 @@ def test_damaged_references_are_as_none(tmp_path):
         bounded(read)
 
 
+HEADS = {
+    "terabytes": b"{'descr': '<f4', 'fortran_order': False, 'shape': (17592186044416,)}",
+    "no end": b"{'descr': (",
+}
+
+
+@pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
+def test_arrays_whose_head_says_what_cannot_be_are_refused(head, tmp_path):
+    path = cache.entry(tmp_path, "a")
+    path.parent.mkdir()
+    with zipfile.ZipFile(path, "w") as packed:
+        packed.writestr("about.npy", np.lib.format.magic(1, 0) + struct.pack("<H", len(head)) + head)
+    assert cache.load(tmp_path, "a") is None
+    with pytest.raises(patch.PatchError, match=r"no grass patch, or it is damaged\.$"):
+        patch.load(path)
+
+
 def a_profile(path):
     node = SimpleNamespace(mode="EXTERNAL", filepath=str(path), id_data=SimpleNamespace(library=None))
     return _profile(node).text
@@ -164,12 +182,20 @@ READERS = [a_profile, lambda path: own_settings._content(str(path)), a_patch]
 def test_what_a_file_names_and_is_no_file_is_not_waited_for(read, tmp_path):
     """A pipe that nobody writes to."""
     os.mkfifo(tmp_path / "pipe")
-    work = threading.Thread(target=read, args=(tmp_path / "pipe",), daemon=True)
+    raised = []
+
+    def tried():
+        try:
+            read(tmp_path / "pipe")
+        except BaseException as error:  # also that of pytest.raises
+            raised.append(error)
+
+    work = threading.Thread(target=tried, daemon=True)
     work.start()
     work.join(5.0)
     if waits := work.is_alive():
         os.close(os.open(tmp_path / "pipe", os.O_WRONLY))
-    assert not waits
+    assert not waits and not raised
 
 
 @pytest.mark.parametrize("read", READERS[::2], ids=["light profile", "grass"])
