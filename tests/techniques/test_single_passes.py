@@ -36,6 +36,22 @@ def test_what_paths_reflect_again_counts_by_its_colour_on_the_surface(gpu_contex
     np.testing.assert_allclose(radiance, expected[order], rtol=1e-5)
 
 
+def test_materials_that_rays_met_are_flagged_and_the_leaders_of_their_programs(gpu_context):
+    """Each at its place in rows of 256; not those of a ray that is none, or of one that left the scene."""
+    numbers, leaders = np.array([0, 5, 255, 300, 7, 8]), {0: 0, 5: 300, 255: 255, 300: 600, 7: 7, 8: 8}
+    place, rays, materials = np.ones((1, 6, 4)), np.ones((1, 6, 4)), np.zeros((hits.MET_ROWS, hits.ROW, 4))
+    rays[0, 4], place[0, 5, 3] = 0.0, 0.0
+    materials.reshape(-1, 4)[[*leaders], 3] = [*leaders.values()]
+    read = {"hit_place": place, "rays": rays, "hit_materials": materials}
+    textures = {name: images.upload(pixels) for name, pixels in read.items()}
+    textures["hit_material"] = images.upload(numbers.reshape(1, 6, 1), "R32F")
+    with images.borrowed(hits.ROW, 2 * hits.MET_ROWS, "R32UI") as met:
+        met.colors[0].texture.clear(format="UINT", value=(0,))
+        passes.compute(hits.MATERIALS_MET, (6, 1), textures=textures, images={"met": met.colors[0]})
+        flags = images.read(met.colors[0]).reshape(2, -1)
+    assert [np.flatnonzero(half).tolist() for half in flags] == [[0, 5, 255, 300], [0, 255, 300, 600]]
+
+
 @pytest.mark.parametrize("number", [0, 5, 255, 300])
 def test_a_material_is_evaluated_where_a_ray_has_met_its_program(gpu_context, number):
     """By one flag for each in rows of 256; where it is not set the triangle lies beside the screen."""
