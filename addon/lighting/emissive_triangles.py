@@ -170,6 +170,7 @@ class EmissiveTriangles:
         normal, radiance = self.normal[k], self.radiance[k]
         row = lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
         row[lights.LIGHT.at.kind] += self.unlit[k]
+        row[lights.LIGHT.at.edge] = self.level
         if at_hits:
             row[lights.LIGHT.at.first_view] = lights.passing_bits(self.passing[k])
         return row

@@ -21,13 +21,14 @@ smooth metal that lobe has direct light alone (near.glsl has the rest).
 
 | cost | per sample, with P = 192 probes and N virtual lights |
 |---|---|
-| candidates, rays | max(1152, 4 N); 2 per bounce + 19 for each, then 192 for the density of each virtual light |
+| candidates, rays | max(1152, 4 N); 2 per bounce (3 if meshes emit) + 19 for each, then 192 for each light |
 | passes, readbacks | 24, most over the candidates or a grid of pixels alone (light_choice.py, probes.py); none |
 
 Bias (diffuse and glossy indirect light): light that reaches less than about half a hundredth of the picture is missed
-where no probe comes near. A light for the area A in one of n samples is clamped at the distance sqrt(A / (pi n)); the
-loss falls with n. Gloss is spread evenly over the pixels that see it. Normals are the triangles', but for direct light
-on bumps and normal maps. Figures: docs/log/2026-11-26-indirect-light.md.
+where no probe comes near. A virtual light for the area A in one of n samples is clamped at the distance
+sqrt(A / (pi n)); the loss falls with n. Points on emissive triangles are clamped likewise; short rays bring the rest
+(emission_close_by of shaders/indirect/path.glsl). Gloss is spread evenly over the pixels that see it. Normals are the
+triangles', but for direct light on bumps and normal maps. Figures: docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
@@ -226,7 +227,9 @@ class VirtualLights:
             for image in held:
                 images.pool.give(image)
             choice.release()
-        frame.count(technique, "path rays", candidates * (4 + 2 * frame.settings.bounces))
+        bounces = frame.settings.bounces
+        close_by = (1 + bounces) * (self._emissive is not None)  # short ones, at each surface
+        frame.count(technique, "path rays", candidates * (4 + 2 * bounces + close_by))
         return VirtualLightSet(self._image, count)
 
     def _make_image(self, frame: Frame, grid: Grid, textures: dict[str, images.Image]) -> None:

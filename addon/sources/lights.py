@@ -30,7 +30,9 @@ LIGHT = Record(
     ),
     asked=(
         ("vec3 u", "float cone"),  # half width of an area light, or row of a spot's inverse matrix; cosine of half cone
-        ("vec3 v", "float edge"),  # half height, or row; 1 / ((1 - cosine) blend), 0: a hard edge
+        # Half height, or row; 1 / ((1 - cosine) blend), 0: a hard edge, or of a point on a surface
+        # EmissiveTriangles.level, W / (m2 sr).
+        ("vec3 v", "float edge"),
         ("vec3 w", "float least"),  # row; least squared distance at which the point stands for its part of the light
     ),
     kinds=("POINT", "SPHERE", "SUN", "RECTANGLE", "ELLIPSE", "DIRECTION", "SURFACE"),

@@ -374,6 +374,40 @@ float even_share(Vertex met)
   return 1.0 - 0.87 * (1.0 - met.upright);
 }
 
+// What reflects light straight from this source: not the lobe where photons bring what that mirrors.
+Reflection straight_reflection(Vertex met, Light light)
+{
+  Reflection reflection = met.reflection;
+  reflection.diffuse *= met.straight;
+#ifdef MIRRORS_OWNED
+  if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
+    reflection.straight = reflection.grazing = vec3(0.0);
+  }
+#endif
+  return reflection;
+}
+
+// What emissive triangles close to a place bring that their points leave out: one at distance d counts min(1, d2 / least)
+// of its light (light_sample), so that a thin lamp on a shelf would light hardly anything of that. A cosine-distributed
+// ray meets them: one at distance d counts the rest. `light`: one of this sample's points, of which all share what they are
+// drawn by. Returns irradiance over PI, from where the ray comes.
+vec3 emission_close_by(Light light, vec3 origin, vec3 normal, uint salt, out vec3 direction)
+{
+  uvec3 bits = hash3(uvec3(salt, 61u, 7u));
+  direction = cosine_direction(normal, vec2(to_unit(bits.x), to_unit(bits.y)));
+  float level = light_edge(light);
+  float spread = light_least(light) * emissive_density(light.radiance, level);  // the same of all points
+  float reach = sqrt(spread / max(level, 1e-30));
+  ivec2 hit;
+  float t = trace_nearest(origin, direction, reach, bits.z, hit);
+  if (t >= reach) {
+    return vec3(0.0);
+  }
+  vec3 ignored;
+  vec3 emission = triangle_emission(hit, direction, ignored) * layers_color(t) * passing_media(origin, direction, t, bits.z);
+  return emission * max(1.0 - t * t * emissive_density(emission, level) / spread, 0.0);
+}
+
 // What a surface reflects towards `viewer` of light straight from the sources of this sample. Of every `light_rays`-th of them
 // one is traced, drawn in proportion to what it brings unblocked: only visibility is sampled. All are weighed before any
 // is traced: pixels that a processor runs together then trace together.
@@ -386,6 +420,8 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
   float bump = (met.upright < 0.99999) ? clamp(0.125 * (1.0 / (met.upright * met.upright) - 1.0), 0.0, 1.0) : 0.0;
   vec3 sum = met.leaving;
   uint roll = salt;
+  int emissive = -1;  // a point on an emissive surface
+  bool all_linked = true;  // no such surface leaves this one unlit: a ray would not tell which it meets
   for (int group = 0; group < min(light_rays, light_count); group++) {
     float total = 0.0;
     float chosen_share = 0.0;
@@ -395,11 +431,15 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
     for (int i = group; i < light_count; i += light_rays) {
       vec3 direction;
 #ifdef HIT_LINKS
-      if (((int(sources.light[i * LIGHT_TEXELS].x) >> 4 >> met.group) & 1) != 0) {
+      int kind = int(sources.light[i * LIGHT_TEXELS].x);
+      if (((kind >> 4 >> met.group) & 1) != 0) {
+        all_linked = all_linked && (kind & 15) != LIGHT_SURFACE;
         continue;
       }
 #endif
-      vec3 arriving = unblocked_irradiance(light_read(i), position, normal, direction);
+      Light light = light_read(i);
+      emissive = (LIGHT_IS(light, LIGHT_SURFACE) && (light.flags & LIGHT_DIFFUSE) != 0) ? i : emissive;
+      vec3 arriving = unblocked_irradiance(light, position, normal, direction);
       float above = dot(direction, met.lit);
       // Bumps shadow themselves, as bump_shadowing of lib/brdf.glsl says of what the camera sees.
       arriving *= (above > 0.0) ? left * ((bump > 0.0) ? bump_dimming(bump, max(above, 1e-6)) : 1.0) : 0.0;
@@ -420,16 +460,18 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
         chosen_light *= layers_color(1e30);
       }
       chosen_light *= passing_media(origin, chosen_direction, light_distance(light, origin, chosen_direction), salt);
-      Reflection reflection = met.reflection;
-      reflection.diffuse *= met.straight;
-#ifdef MIRRORS_OWNED
-      if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
-        reflection.straight = reflection.grazing = vec3(0.0);
-      }
-#endif
-      sum += chosen_light * reflection_of(reflection, normal, chosen_direction, viewer)
+      sum += chosen_light * reflection_of(straight_reflection(met, light), normal, chosen_direction, viewer)
              * (visibility * total / chosen_share);
     }
+  }
+  // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+  for (; emissive >= 0 && all_linked; emissive = -1) {
+    Light light = light_read(emissive);
+    vec3 direction;
+    vec3 arriving = emission_close_by(light, origin, normal, salt, direction);
+    float above = dot(direction, met.lit);
+    arriving *= (above > 0.0) ? left * ((bump > 0.0) ? bump_dimming(bump, max(above, 1e-6)) : 1.0) : 0.0;
+    sum += PI * arriving * reflection_of(straight_reflection(met, light), normal, direction, viewer);
   }
   return sum;
 }
