@@ -16,19 +16,18 @@ have found y, so the density of candidates is the sum over all probes x:
 A candidate has the intensity L / n. `count` of them are kept by systematic resampling in proportion to L, cell by
 cell along a space-filling curve (after Georgiev & Slusallek 2010), so that one candidate more or less changes only
 what is kept nearby. Densities are traced for those kept alone. Surfaces have the picture's colours where the camera
-sees them, else their material's mean (reflectance.py), and a lobe of microfacets towards the probe that found them; of
-smooth metal that lobe has direct light alone (near.glsl has the rest).
+sees them, else their material's mean (reflectance.py), and a lobe of microfacets towards the probe that found them
+(of smooth metal for direct light alone, near.glsl).
 
 | cost | per sample, with P = 192 probes and N virtual lights |
 |---|---|
 | candidates, rays | max(1152, 4 N); 2 per bounce (3 if meshes emit) + 19 for each, then 192 for each light |
 | passes, readbacks | 24, most over the candidates or a grid of pixels alone (light_choice.py, probes.py); none |
 
-Bias (diffuse and glossy indirect light): light that reaches less than about half a hundredth of the picture is missed
-where no probe comes near. A virtual light for the area A in one of n samples is clamped at the distance
-sqrt(A / (pi n)); the loss falls with n. Points on emissive triangles are clamped likewise; short rays bring the rest
-(emission_close_by of shaders/indirect/path.glsl). Gloss is spread evenly over the pixels that see it. Normals are the
-triangles', but for direct light on bumps and normal maps. Figures: docs/log/2026-11-26-indirect-light.md.
+Bias (diffuse and glossy indirect light): what brings less than half a hundredth of the light is missed where no probe
+comes near. A virtual light for the area A in one of n samples is clamped at sqrt(A / (pi n)); the loss falls with n.
+Points on emissive triangles are clamped likewise, and short rays bring the rest (emission_close_by in path.glsl). Gloss
+is spread evenly. Normals are the triangles', but for direct light. Figures: docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
