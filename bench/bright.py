@@ -12,6 +12,7 @@ table; rows of others stay.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import tempfile
 from collections import Counter
 from pathlib import Path
@@ -47,14 +48,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> int:
     import addon
-    from addon.compare.reference import render_passes
-    from bench import glass_scenes, reflection_scenes
 
     addon.register()
     size = tuple(int(side) for side in options.size.split("x"))
     if options.page and (options.before or (options.samples, size) != (SAMPLES, SIZE)):
         raise ValueError(f"{PAGE.name} has {SAMPLES} samples, {SIZE} pixels and nothing of --before: leave --page out.")
-    older = Version(options.before) if options.before else None
+    with contextlib.ExitStack() as ends:
+        older = Version(options.before) if options.before else None
+        if older:
+            ends.callback(older.end)
+        print(_counted(options, size, older))
+    return 0
+
+
+def _counted(options: argparse.Namespace, size: tuple[int, int], older: Version | None) -> str:
+    """What the page says, which is written after each scene. `older` renders with the other working tree."""
+    from addon.compare.reference import render_passes
+    from bench import glass_scenes, reflection_scenes
+
     head = BEFORE_HEAD if older else HEAD
     rows = markdown.rows_of(PAGE.read_text(encoding="utf-8"), COMMAND, head) if options.page else []
     for name in options.scenes or (*FILES, *BUILT, *reflection_scenes.SCENES, *glass_scenes.SCENES):
@@ -77,10 +88,7 @@ def command(options: argparse.Namespace) -> int:
         text = f"Isolated bright pixels: {told}.\n\n{markdown.table([head, *rows])}"
         if options.page:
             markdown.put_between(PAGE, COMMAND, text)
-    print(text)
-    if older:
-        older.end()
-    return 0
+    return text
 
 
 def _by(older: Version, samples: int, size: tuple[int, int]) -> np.ndarray:

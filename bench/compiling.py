@@ -19,6 +19,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 from pathlib import Path
 
 from bench.beside import ROOT, scenes_of
@@ -30,6 +31,7 @@ LONG = 1.0  # s of the processor, which no redraw should take
 TOLD = 3  # redraws of a scene
 NAMED = 6  # programs of a scene that are told by name
 ANSWER = "compiled "
+LIMIT_S = 1800.0  # after which a process that has not answered is ended
 # In a process of its own: the driver's cache is chosen when the process begins.
 TIMED = """
 import json, sys, time
@@ -103,23 +105,26 @@ print("{ANSWER}" + json.dumps(redraws), flush=True)
 """
 
 
-def measured(script: str, scene: Path, size: tuple[int, int]) -> list:
+def measured(script: str, scene: Path, size: tuple[int, int], limit_s: float = LIMIT_S) -> list:
     """What a script answers of a scene, in a process of its own without the driver's cache. RuntimeError if it gives no
-    answer."""
+    answer in time."""
     with tempfile.TemporaryDirectory() as folder:
         empty = {"MESA_SHADER_CACHE_DIR": folder, "MESA_SHADER_CACHE_DISABLE": "true"}
         asked = [sys.executable, "-c", script, str(scene), *map(str, size)]
         found = subprocess.Popen(
             asked, cwd=ROOT, env={**os.environ, **empty}, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
         )
+        late = threading.Timer(limit_s, found.kill)  # which ends what is read below
+        late.start()
         try:
             for line in found.stdout:
                 if line.startswith(ANSWER):
                     return json.loads(line[len(ANSWER) :])
         finally:
+            late.cancel()
             found.kill()  # its own exit handlers may wait for ever
             found.wait()
-    raise RuntimeError(f"{scene.stem}: the process that draws it ended without an answer.")
+    raise RuntimeError(f"{scene.stem}: the process that draws it gave no answer, or none within {limit_s:g} s.")
 
 
 def row(scene: str, first: float, second: float, programs: dict[str, float]) -> tuple[str, ...]:

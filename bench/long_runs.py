@@ -3,14 +3,17 @@
 As many as fit in that time are rendered one after the other in one process, with bounces and 1 to 4 samples. Told are
 pixels that are not finite, errors, what memory the process held meanwhile, and what of it is kept by name. With
 `--same` the first scene is rendered again and again, which tells what stays of a picture. With `--keep` the run goes on
-after the last scene of the runs before it, so that their figures add up: bench/results/random_BACKEND.json holds them,
-with the commit of each. A run that did not come to its end, because its process died or was stopped, is told apart; the
-next one begins with the scene at which that was. `--alone 0 --keep` tells of what is kept alone.
+after the last scene of the runs before it that drew alike, so that their figures add up:
+bench/results/random_BACKEND.json holds them, with the commit of each; one process at a time. A run whose process died
+(Ctrl-C ends one as its time does) is told apart: the scene at which that was counts as wrong, and the next run begins
+after it. `--alone 0 --keep` tells of what is kept alone.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import fcntl
 import json
 import resource
 import time
@@ -38,35 +41,65 @@ class Run:
     resident: list[tuple[int, int]] = field(default_factory=list)  # MiB after so many scenes
     seconds: float = 0.0  # of the processor
     ended: bool = False
+    samples: int = 64
+
+    @property
+    def current(self) -> int:
+        """The scene that is drawn; after the end of a process that died, the one at which that was."""
+        return self.first + self.count
 
     @property
     def following(self) -> int:
-        return self.first + self.count
+        return self.current + (not self.ended)
+
+    @property
+    def kind(self) -> tuple:
+        """What runs have in common whose figures add up."""
+        return tuple(self.size), self.alike, self.samples
 
 
 def alone(options: argparse.Namespace) -> int:
-    """Render scenes for so many seconds; 1 if one of them failed or had pixels that are not finite."""
+    """Render scenes for so many seconds; 1 if one of them failed or had pixels that are not finite, or if runs cannot
+    be kept."""
     place = place_of(_backend())
+    if not options.keep:
+        return _alone(options, place)
+    if options.same:
+        print("--keep goes on with other scenes, --same with none: choose one of them.")
+        return 1
+    try:
+        with only_here(place):
+            return _alone(options, place)
+    except BlockingIOError:
+        print(f"Another process keeps its runs in {place}.")
+        return 1
+
+
+def _alone(options: argparse.Namespace, place: Path) -> int:
     before = read(place) if options.keep else []
-    first = max((one.following for one in before), default=options.first) if options.keep else options.first
-    run = Run(ages.git("rev-parse", "--short=8", "HEAD") or "unknown", tuple(options.size), options.alike, first)
+    run = Run(ages.git("rev-parse", "--short=8", "HEAD") or "unknown", tuple(options.size), options.alike,
+              options.first, samples=options.samples)  # fmt: skip
+    run.first = max((one.following for one in before if one.kind == run.kind), default=run.first)
     until = time.monotonic() + options.alone
-    while time.monotonic() < until:
-        if options.keep:  # as if it died here: what ends it may not let it say so
-            write(place, [*before, run])
-        _render(run, options)
-        if run.count % options.every == 0:
-            run.resident.append((run.count, _resident()))
-            print(f"{run.count} scenes, {run.resident[-1][1]} MiB; {_held()}", flush=True)
+    with contextlib.suppress(KeyboardInterrupt):
+        while time.monotonic() < until:
+            if options.keep:  # as if it died here: what ends it may not let it say so
+                write(place, [*before, run])
+            _render(run, options)
+            if run.count % options.every == 0:
+                run.resident.append((run.count, _resident()))
+                print(f"{run.count} scenes, {run.resident[-1][1]} MiB; {_held()}", flush=True)
     run.ended = True
-    if options.keep and run.count:
-        write(place, [*before, run])
+    kept = [*before, *([run] if run.count else [])]
+    if options.keep and place.exists():
+        write(place, kept)
     print(f"{run.count} scenes, {len(run.wrong)} wrong: {[*run.wrong]}; {run.seconds:.0f} s of the processor")
     if len(run.resident) > 3:
         held = [mib for _, mib in run.resident]
         print(f"{held[len(held) // 4]} MiB after a quarter of them, {max(held)} at most, {held[-1]} at the end")
     if options.keep:
-        print(total(place.stem, [*before, *([run] if run.count else [])]))
+        for kind in dict.fromkeys(one.kind for one in kept):
+            print(total(place.stem, [one for one in kept if one.kind == kind]))
     return int(bool(run.wrong))
 
 
@@ -76,7 +109,7 @@ def _render(run: Run, options: argparse.Namespace) -> None:
     from addon.frame import ledger
     from bench import random_scenes
 
-    number = run.first if options.same else run.following
+    number = run.first if options.same else run.current
     scene, notes = random_scenes.build(number, options.alike)
     try:
         render_passes(scene, "CANDELA", 1 + number % min(options.samples, 4), number, size=options.size)
@@ -131,13 +164,24 @@ def write(place: Path, runs: list[Run]) -> None:
     write_whole(place, json.dumps([asdict(one) for one in runs], indent=1) + "\n")
 
 
+@contextlib.contextmanager
+def only_here(place: Path):
+    """BlockingIOError if another process keeps runs there; the system lets go of what a dead one held."""
+    place.parent.mkdir(exist_ok=True)
+    with place.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+
+
 def total(name: str, runs: list[Run]) -> str:
-    """What all runs of a file say together."""
-    wrong = [number for one in runs for number in one.wrong]
+    """What all runs of a kind say together."""
+    died = [one.current for one in runs if not one.ended]
+    wrong = [*(int(number) for one in runs for number in one.wrong), *died]
     most = max((mib for one in runs for _, mib in one.resident), default=0)
-    died = [one.following for one in runs if not one.ended]
-    count, seconds = sum(one.count for one in runs), sum(one.seconds for one in runs)
+    count, seconds = sum(one.count for one in runs) + len(died), sum(one.seconds for one in runs)
+    (width, height), alike, samples = runs[0].kind
     return (
-        f"{name}: {count} scenes in {len(runs)} runs, {len(wrong)} wrong: {wrong}; {most} MiB at most;"
+        f"{name}, {width}x{height}, {alike} alike, of {samples} samples: {count} scenes"
+        f" in {len(runs)} runs, {len(wrong)} wrong: {wrong}; {most} MiB at most;"
         f" {len(died)} runs without an end, at {died}; {seconds:.0f} s of the processor"
     )

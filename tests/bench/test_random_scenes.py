@@ -96,7 +96,7 @@ def test_a_run_that_is_kept_goes_on_where_the_last_one_ended_and_figures_add_up(
     first = rendered("--keep", "--first", "7")
     second = rendered("--keep", bad=1)
     assert first[0] == 7 and first + second == list(range(7, 7 + len(first) + len(second)))
-    (place,) = tmp_path.iterdir()
+    (place,) = tmp_path.glob("*.json")
     runs = long_runs.read(place)
     assert [one.count for one in runs] == [len(first), len(second)] and all(one.ended for one in runs)
     assert [*runs[1].wrong] == [str(number) for number in second] and runs[0].resident[-1][0] == len(first)
@@ -105,7 +105,7 @@ def test_a_run_that_is_kept_goes_on_where_the_last_one_ended_and_figures_add_up(
     assert f"{len(first) + len(second)} scenes in 2 runs, {len(second)} wrong" in capsys.readouterr().out
 
 
-def test_a_run_whose_process_dies_is_told_apart_and_the_next_begins_with_its_scene(rendered, capsys, monkeypatch):
+def test_a_scene_at_which_the_process_dies_is_wrong_and_the_next_run_begins_after_it(rendered, capsys, monkeypatch):
     def dies(run, options):
         if run.count == 2:
             raise SystemExit
@@ -115,5 +115,37 @@ def test_a_run_whose_process_dies_is_told_apart_and_the_next_begins_with_its_sce
         changed.setattr(long_runs, "_render", dies)
         with pytest.raises(SystemExit):
             rendered("--keep", "--alone", "60")
+    assert rendered("--keep")[0] == 3
+    told = capsys.readouterr().out
+    assert "1 wrong: [2]" in told and "1 runs without an end, at [2]" in told
+
+
+def test_a_run_that_is_stopped_by_a_key_has_an_end(rendered, capsys, monkeypatch):
+    def stopped(run, options):
+        if run.count == 2:
+            raise KeyboardInterrupt
+        run.count += 1
+
+    with monkeypatch.context() as changed:
+        changed.setattr(long_runs, "_render", stopped)
+        rendered("--keep", "--alone", "60")
+    assert "2 scenes in 1 runs, 0 wrong" in capsys.readouterr().out
     assert rendered("--keep")[0] == 2
-    assert "1 runs without an end, at [2]" in capsys.readouterr().out
+
+
+def test_only_runs_that_drew_alike_are_joined(rendered, capsys):
+    first = rendered("--keep")
+    others = [rendered("--keep", *words)[0] for words in (["--size", "24x18"], ["--alike", "5"], ["--samples", "2"])]
+    assert others == [0, 0, 0] and rendered("--keep")[0] == len(first)
+    told = capsys.readouterr().out
+    assert "random_opengl, 24x18, 1 alike, of 64 samples" in told and "in 2 runs" in told
+
+
+def test_two_processes_do_not_keep_runs_in_one_file(rendered, capsys, tmp_path):
+    rendered("--keep")
+    (place,) = tmp_path.glob("*.json")
+    before = place.read_text()
+    with long_runs.only_here(place):
+        assert rendered("--keep", bad=1) == []
+    assert "Another process keeps its runs" in capsys.readouterr().out and place.read_text() == before
+    assert rendered("--keep", "--same", bad=1) == []

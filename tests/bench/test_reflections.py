@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.compare import reference as references
 from addon.compare.cache import Reference
 from bench import glass_scenes, markdown, reflection_scenes, reflection_truth, reflections, shapes
 from bench.shading import glass
@@ -67,3 +68,18 @@ def test_each_channel_of_a_truth_in_three_parts_is_of_its_own_scene():
 def test_scenes_whose_truth_has_parts_or_more_samples_are_there():
     named = {*reflection_scenes.SCENES, *glass_scenes.SCENES}
     assert {*reflection_truth.LEAST, *glass_scenes.CHANNELS} <= named
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "has"),
+    [("gloss below glass", 256, 16384), ("gloss below glass", 20000, 20000), ("none of those", 256, 256)],
+)
+def test_a_truth_has_as_many_samples_as_were_asked_for_and_its_light_needs(monkeypatch, name, asked, has):
+    seen = []
+    monkeypatch.setattr(reflection_scenes, "make", lambda name: {"glossy_bounces": 7})
+    monkeypatch.setattr(reflection_truth, "bounces", lambda scene: [scene["glossy_bounces"]])
+    monkeypatch.setattr(
+        references, "reference", lambda scene, samples, size, extra: seen.append((samples, size, extra)) or "truth"
+    )
+    assert reflection_truth.reference(name, asked, (8, 6)) == "truth"
+    assert seen == [(has, (8, 6), [7])]

@@ -84,6 +84,7 @@ def test_of_lamps_whose_visibility_rays_tell(stage, case, material):
         if case == "linked":
             blocked_alone(stage, lamp)
         found.append(stage.render(64, (16, 16))["combined"][5:11, 5:11, :3].mean((0, 1)))
+    assert found[0].min() > 0
     passes = np.array(TINT[:3]) * (0.5 if material == "mixed" else 1.0)
     assert found[1] == pytest.approx(found[0] * passes, rel=0.05)
 

@@ -572,17 +572,19 @@ def test_walks_find_light_behind_the_rim_of_a_thin_body(stage):
     assert shown(stage.render(16, size=(16, 16))).mean(axis=(0, 1)) == pytest.approx(cycles, rel=0.04, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_the_dark_rim_of_a_block_gets_no_light_of_pixels_further_in(stage, monkeypatch):
     """A block of wax lit from behind, dim pixels of its outline: a mean over pixels on their one side alone made their
     red 1.27 of Cycles' (pictures of 1.17 to 1.35)."""
     subsurface.block("RANDOM_WALK")
     monkeypatch.setattr(stage.scene.render, "filter_size", 1.5)
-    cycles = shown(stage.render(512, size=(32, 24), engine="CYCLES"))
-    ours = np.mean([shown(stage.render(16, size=(32, 24), seed=seed)) for seed in (1, 2)], axis=0)
+    cycles = shown(stage.render(4096, size=(32, 24), engine="CYCLES"))  # to 1 %: of 512 two seeds are 13 % apart
+    ours = np.mean([shown(stage.render(64, size=(32, 24), seed=seed)) for seed in range(1, 5)], axis=0)
     bright = cycles @ [0.2126, 0.7152, 0.0722]
     dim = (bright > 0.002) & (bright < 0.02)
     print(f"dim {(ours[dim].sum(axis=0) / cycles[dim].sum(axis=0)).round(3)}")
-    assert ours[dim, 0].sum() == pytest.approx(cycles[dim, 0].sum(), rel=0.2)
+    # Pictures of 64 samples differ by 3 % (of 16 by 7 %), the mean of four by half of that.
+    assert ours[dim, 0].sum() == pytest.approx(cycles[dim, 0].sum(), rel=0.1)
 
 
 def test_small_pictures_have_as_many_walks_a_free_path_as_large_ones(stage):

@@ -490,6 +490,7 @@ def test_probes_stand_on_the_surface_that_is_seen_one_in_each_cell(stage, render
     stage.camera_above(2.0)
     stage.scene.candela.slot_indirect = "instant_radiosity"
     render(1, samples=4)
+    assert found
     for places, room in found:
         stand = places[places[:, 3] > 0, :3].astype(float)
         assert 0.3 * room < len(stand) <= room

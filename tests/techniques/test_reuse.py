@@ -1,6 +1,5 @@
 """Skip, reuse, then compute: the ledger says what ran and why the rest did not, and unchanged work is not redone."""
 
-import resource
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from addon.frame.ledger import RAN, REUSED, SKIPPED
 from addon.gfx import context, device, images, library
 from addon.lighting.point_maps import PointMaps
 from addon.techniques.surfaces import Surfaces
+from bench.memory import resident_bytes
 
 
 @pytest.fixture
@@ -190,15 +190,8 @@ def test_a_technique_that_was_skipped_leaves_no_light_behind(room):
     assert not room.render(2)["combined"][..., :3].any()
 
 
-STATISTICS = Path("/proc/self/statm")  # sizes in pages: program, resident, …
-
-
-def resident_bytes():
-    return int(STATISTICS.read_text().split()[1]) * resource.getpagesize()
-
-
 @pytest.mark.slow
-@pytest.mark.skipif(not STATISTICS.exists(), reason="only Linux tells a process its size in a file")
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="only Linux tells a process its size in a file")
 def test_fifty_renders_with_changes_leave_memory_flat(room):
     """Sessions freed, sizes and settings changed, objects added and removed: neither pool nor process grows."""
     room.world((0.2, 0.3, 0.4))

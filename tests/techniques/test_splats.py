@@ -13,6 +13,7 @@ from addon.sources import lights
 from addon.techniques.caustics_mapping import INTO_MAP
 
 SIDE, SPAN = 64, 4.0
+NO_WALL = (1, 0, 2)  # farther away than the footprint reaches
 
 
 def view_from_above():
@@ -43,7 +44,7 @@ def receivers(view):
 @pytest.mark.parametrize(
     "axes", [((0.5, 0, 0), (0, 0.5, 0)), ((0.9, 0.4, 0), (-0.1, 0.225, 0)), ((0.3, 0, 0), (0, 1.2, 0))]
 )
-@pytest.mark.parametrize("wall", [(1, 0, 2), (1, 0, 0), (0.6, -0.8, 0.3)])
+@pytest.mark.parametrize("wall", [NO_WALL, (1, 0, 0), (0.6, -0.8, 0.3)])
 def test_all_of_a_value_arrives(gpu_context, axes, wall):
     """Also where a wall, by direction and distance in half axes, ends the footprint (caustics/footprint.frag.glsl)."""
     view = view_from_above()
@@ -55,7 +56,7 @@ def test_all_of_a_value_arrives(gpu_context, axes, wall):
         record[0, 0, 3] = share
     target = images.Target((images.pool.take(SIDE, SIDE, "RGBA32F"),))
     target.clear()
-    places = 16  # so that it does not matter where in a texel the wall stands
+    places = 1 if wall == NO_WALL else 16  # so that it does not matter where in a texel the wall stands
     for k in range(places):
         records[0][0, 0] = 0.1 + k / places * area**0.5, -0.2 + 7 * k % places / places * area**0.5, 0.0, 1.0
         splats.draw(

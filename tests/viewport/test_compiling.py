@@ -85,6 +85,7 @@ def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones
     np.testing.assert_array_equal(images.read(cold.viewport.picture), expected)
 
 
+@pytest.mark.slow
 def test_programs_that_follow_rays_come_in_one_by_one(scene, monkeypatch):
     """They are the largest: no part of a sample compiles two, in a draft or in full, at pixels or in mirrors."""
     material = material_named("Shiny")

@@ -128,9 +128,11 @@ ODD = (
     mirrored_copies_under_a_lamp_of_nodes, emission_through_holes, catcher_and_holdout_without_light,
     hair_seen_by_a_wide_lens, orthographic_inside_of_a_box, linked_light_on_two_lobes,
 )  # fmt: skip
+FAST = (meshes_without_area, catcher_and_holdout_without_light)
+CASES = [pytest.param(one, id=one.__name__, marks=() if one in FAST else pytest.mark.slow) for one in ODD]
 
 
-@pytest.mark.parametrize("odd", ODD, ids=lambda one: one.__name__)
+@pytest.mark.parametrize("odd", CASES)
 def test_draft_of_an_odd_scene_is_drawn(scene, region, odd):
     odd(scene, bpy.data.objects["Cube"])
     region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.01}
