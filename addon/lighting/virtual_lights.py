@@ -1,9 +1,8 @@
 """Virtual lights: points on surfaces that light the picture with the radiance they reflect, for any gatherer.
 
-Candidates are found from the picture, as in bidirectional instant radiosity (Segovia et al. 2006): at P points of
-what it shows, in cells of space ("probes", probes.py), R cosine-distributed rays are traced; where one meets a
-surface, at y, stands a candidate. It has the direct light that y reflects, and what a path on from y finds in up to
-`bounces` reflections in all:
+Candidates are found from the picture, as in bidirectional instant radiosity (Segovia 2006): at P points of what it
+shows, in cells of space ("probes", probes.py), R cosine-distributed rays start; where one meets a surface, at y, is a
+candidate. It has the direct light that y reflects, and what a path on from y finds in up to `bounces` reflections:
 
     L(y) = rho / pi * (E(y) + sum over further bounces of their albedos x E there)
 
