@@ -335,7 +335,7 @@ class Film:
     transparent: bool = False
     clear_glass: float = -1.0  # roughness up to which glass shows a transparent film's hole behind it; below 0: none
     exposure: float = 1.0
-    caustics_reflective: bool = True  # switches of the scene: whether light that mirrors or glass throw is wanted
+    caustics_reflective: bool = True  # whether diffuse surfaces see light that mirrors, or glass, throw
     caustics_refractive: bool = True
     mist: Mist | None = None  # this and what follows: what passes ask for beside light and colours
     position: bool = False
