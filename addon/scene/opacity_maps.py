@@ -20,7 +20,8 @@ and .0046 at 256, where one opacity for all of a material left .0209 and .0167: 
 Instances of a mesh whose opacity depends on the object or on where it is are measured one by one, up to APART of them.
 
 Fails: more of those share the mean over some of them, and opacity that depends on the direction is that of four
-directions together.
+directions together. What passes has its material's mean colour (traced_triangles.py) over the cell's luminance: of
+stained panes with two faces, which light passes at the same colour twice, diffuse indirect light is .78 of Cycles'.
 """
 
 from __future__ import annotations
