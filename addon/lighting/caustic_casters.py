@@ -245,41 +245,47 @@ def _only_spread(snapshot: Snapshot, shown: list[Instance], mirrors: Iterable[in
     return not among.all(axis=2).any() and all(is_convex(snapshot.meshes[mesh]) for mesh in {one.mesh for one in shown})
 
 
-_convex: dict[tuple, bool] = {}  # by what tells a mesh's content
+_facing: dict[tuple, float] = {}  # by what tells a mesh's content
 
 
 def is_convex(mesh: Mesh) -> bool:
     """Whether a mesh is closed, and bends away from itself at many edges and towards itself at none."""
+    return convex_facing(mesh) != 0.0
+
+
+def convex_facing(mesh: Mesh) -> float:
+    """Of a convex mesh (is_convex) 1 where its triangles face outwards, -1 where inwards; of others 0."""
     key = (mesh.key, mesh.version, mesh.triangle_count, mesh.bounds_min.tobytes(), mesh.bounds_max.tobytes())
-    if key not in _convex:
-        if len(_convex) > 256:
-            _convex.clear()
-        _convex[key] = mesh.triangle_count <= MOST_LOOKED_AT and _bends_away(mesh)
-    return _convex[key]
+    if key not in _facing:
+        if len(_facing) > 256:
+            _facing.clear()
+        _facing[key] = _convex_facing(mesh) if mesh.triangle_count <= MOST_LOOKED_AT else 0.0
+    return _facing[key]
 
 
-def _bends_away(mesh: Mesh) -> bool:
+def _convex_facing(mesh: Mesh) -> float:
     triangles = mesh.corner_vertices[mesh.triangle_corners].astype(np.int64)  # (T, 3)
     edges = np.sort(np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
     opposite = np.concatenate([triangles[:, (k + 2) % 3] for k in range(3)])
     owner = np.tile(np.arange(len(triangles)), 3)
     order = np.argsort(edges[:, 0] * len(mesh.positions) + edges[:, 1], kind="stable")
     if len(order) < 2 * _FEWEST_EDGES or len(order) % 2:
-        return False
+        return 0.0
     one, other = order[::2], order[1::2]
     third = np.r_[order[2::2], order[:1]]
     if (edges[one] != edges[other]).any() or (edges[other] == edges[third]).all(axis=1).any():
-        return False  # an edge of one triangle, or of more than two
+        return 0.0  # an edge of one triangle, or of more than two
     places = mesh.positions.astype(np.float64)
     corners = places[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     if not (length > 0).all():
-        return False
+        return 0.0
     offset = places[opposite[other]] - places[edges[one, 0]]
     sine = np.einsum("ij,ij->i", (normals / length[:, None])[owner[one]], offset) / np.linalg.norm(offset, axis=1)
-    sine *= -np.sign(sine.sum())  # normals may all point inwards
-    return bool((sine < 1e-4).all() and (sine < -1e-4).mean() >= LEAST_BENT)
+    facing = -float(np.sign(sine.sum()))  # normals may all point inwards
+    sine *= facing
+    return facing if (sine < 1e-4).all() and (sine < -1e-4).mean() >= LEAST_BENT else 0.0
 
 
 def boxes_of(frame: Frame, found: Casters) -> Iterable[tuple[np.ndarray, np.ndarray]]:

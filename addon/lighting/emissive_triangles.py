@@ -13,7 +13,7 @@ from ..scene.emission_maps import EmissiveLevel, TriangleEmission
 from ..scene.receivers import Receivers
 from ..snapshot.scene import Instance, Mesh
 from ..sources import lights
-from .caustic_casters import is_convex
+from .caustic_casters import convex_facing
 
 LONG = 8.0  # squared longest side by area, from which on a triangle is halved; half a square has 4
 LARGE_SHARE = 1 / 256  # of all power: smaller triangles stay whole
@@ -22,6 +22,7 @@ MOST_SPACED = 256  # points whose distance from each other is measured
 MOST_ASKED = 512  # triangles whose distance from what is lit is measured
 TURN = np.array([[1, -0.02, -0.02], [0.02, 1, -0.02], [0.02, 0.02, 1]])  # the axes' six directions into six octants
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
+LEAST_VOLUME = 1e-9  # of a body along skewed axes, over that along as long ones at right angles
 SOLID = ("camera", "diffuse", "glossy", "transmission", "volume", "shadow")  # what an object lets nothing pass of
 PATHS["volume"] = 0  # media ask for no flag: their lights are those that they see
 
@@ -202,17 +203,19 @@ def _outwards(frame: Frame, instance: Instance, mesh: Mesh) -> float:
     where its triangles face outwards, -1 where inwards; of others 0. Rays to its far side would else be lost."""
     visible = instance.visibility
     solid = not any(frame.materials.compiled[k].transparent for k in instance.materials) and not instance.links.passing
-    if not (solid and all(getattr(visible, path) for path in SOLID) and is_convex(mesh)):
+    if not (solid and all(getattr(visible, path) for path in SOLID)):
         return 0.0
-    camera = frame.snapshot.camera
+    camera, axes = frame.snapshot.camera, instance.matrix[:3, :3].astype(np.float64)
     if camera.from_above or camera.bends:
         return 0.0
-    eye = np.linalg.inv(instance.matrix) @ camera.matrix[:, 3]
-    near = camera.clip_start / max(float(np.cbrt(abs(np.linalg.det(instance.matrix[:3, :3])))), 1e-30)
-    if ((mesh.bounds_min - near <= eye[:3]) & (eye[:3] <= mesh.bounds_max + near)).all():
+    if not abs(np.linalg.det(axes)) > LEAST_VOLUME * np.linalg.norm(axes, axis=0).prod():
+        return 0.0  # flattened: it has no inside
+    inverse = np.linalg.inv(axes)
+    eye = inverse @ (camera.matrix[:3, 3] - instance.matrix[:3, 3])
+    near = camera.clip_start * np.linalg.norm(inverse, axis=1)  # from the box's sides
+    if ((mesh.bounds_min - near <= eye) & (eye <= mesh.bounds_max + near)).all():
         return 0.0
-    corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners]].astype(np.float64) - mesh.bounds_min
-    return float(np.sign(np.linalg.det(corners).sum()))
+    return convex_facing(mesh)
 
 
 def compact(corners: np.ndarray, radiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

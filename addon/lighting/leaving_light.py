@@ -1,11 +1,11 @@
 """Light that leaves surfaces below which it scatters, for whoever sees them but the camera: bounces, mirrors, fog.
 
 In samples in which somebody asks, walks from points of the mesh (scene/scatter_points.py) find what leaves there of
-the direct light of all points: from all of them in the first sample, later from every `stride`-th row in turn. Their
-mean over the samples so far, with a grid of voxels around each object, stands in one list, an image, so that rays find
-it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The list
-is written anew when the number of samples has doubled, or grown by RENEWED. Of indirect light they send on what leaves
-on the side where it came from.
+the direct light of all points: from all of them in the first such samples, later from every `stride`-th row in turn.
+Their mean over the samples so far, with a grid of voxels around each object, stands in one list, an image, so that rays
+find it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The
+list is written anew when the number of samples has doubled, or grown by RENEWED. Of indirect light they send on what
+leaves on the side where it came from.
 
 | cost | per sample |
 |---|---|
@@ -36,6 +36,7 @@ from ..scene.view import VIEW
 from ..surfaces.hits import Hits
 
 WALKS = 4  # of a point in a picture of one sample: their light arrives from many points
+WHOLE = 8  # times first that all points have walks
 RENEWED = 16  # samples after which the list is written anew, at most
 WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 5, images.LIST_WIDTH
 LEFT = ("sent", "slope", "same", "red", "green", "blue")
@@ -52,7 +53,8 @@ LEAVING = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"),),
     constants=(
-        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("INT", "in_glass"),
+        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("INT", "turn"),
+        ("INT", "in_glass"),
         ("FLOAT", "offset_size"),
     ),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
@@ -77,10 +79,11 @@ class LeavingService(Service):
     image: Callable[[], images.Image | None]
 
 
-def stride_of(samples: int) -> int:
-    """Of how many rows of points one has walks in a sample after the first: 1 of fewer than 16 samples, 2 of 16, 4
-    of 64. So points have 8 walks and more, and the more samples, the more of them."""
-    return max(int((samples / 4) ** 0.5), 1)
+def stride_of(drawn: int) -> int:
+    """Of how many rows of points one has walks, where this was `drawn` so often before: all of them at first, of 64
+    times an eighth. It goes by what was drawn: how many samples follow may be unknown. After N times points have about
+    2 N^(1/2) walks, from 8 on; all rows have two turns and more before the stride grows."""
+    return 1 if drawn < WHOLE else int(drawn**0.5)
 
 
 def _leaving(frame: Frame) -> dict[str, images.Image] | None:
@@ -138,7 +141,7 @@ class LeavingLight:
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
                 "in_glass": int(coated),
                 "walks": 1 if settings.schedule.is_draft else max(WALKS // settings.samples, 1),
-                "stride": stride_of(settings.samples) if self._drawn else 1,
+                "stride": stride_of(self._drawn), "turn": self._drawn,
             },
         )  # fmt: skip
         self._drawn += 1

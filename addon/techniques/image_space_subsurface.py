@@ -210,6 +210,7 @@ class ImageSpaceSubsurface(Technique):
         self._coat: images.Image | None = None  # of cells, where anything is glass: by how much more light enters
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
+        self._leaves: tuple[int, ...] = ()  # materials whose light is listed there
         self._met: tuple[int, ...] | None = None  # what the rays of these have met
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -276,10 +277,11 @@ class ImageSpaceSubsurface(Technique):
         self._leaving.begin()
         # In glass, which shows them without pixels around, other methods are known from points, too.
         graphs = frame.snapshot.materials
-        walked = [k for k in self._materials if self._coat is not None or may_walk(graphs[k].graph)]
+        walked = tuple(k for k in sorted(self._materials) if self._coat is not None or may_walk(graphs[k].graph))
         if walked and self.points.rows:
-            if moved or self._leaving.image is None:
+            if moved or walked != self._leaves or self._leaving.image is None:
                 self._leaving.update(self.points, walked)
+                self._leaves = walked
             frame.provide(LeavingService(lambda: self._leaving_image(frame)))
         frame.count(self, "points", self.points.rows * ROW)
         frame.count(self, "objects", len(self.points.objects))

@@ -16,9 +16,13 @@
 #define WAYS 64
 #define FACES 12  // that a ray is mirrored by
 
-// Index of refraction of a material that is clear glass and nothing else; 0 of others.
+// Index of refraction of a material that is clear glass and nothing else; 0 of others, and of a single sheet: of light below
+// that its own code lets pass what comes in.
 float glass_index(ivec2 hit)
 {
+  if (triangle_is_sheet(hit)) {
+    return 0.0;
+  }
   int material = triangle_material(hit);
   return glass_indices_fetch(ivec2(material & 2047, material >> 11)).x;
 }

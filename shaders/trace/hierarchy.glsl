@@ -572,10 +572,15 @@ bool triangle_is_glass(ivec2 hit)
   return leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)] < 0.0;
 }
 
-// Whether a triangle is glass that is no closed solid, and a ray meets it from within.
-bool leaves_sheet(ivec2 hit, vec3 position, vec3 direction)
+// Whether it is glass that is no closed solid.
+bool triangle_is_sheet(ivec2 hit)
 {
   float code = leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)];
-  bool sheet = code < 0.0 && floor(-code / (SIDES * SIDES)) == 3.0;
-  return sheet && dot(triangle_shading_normal(hit, position), direction) > 0.0;
+  return code < 0.0 && floor(-code / (SIDES * SIDES)) == 3.0;
+}
+
+// And a ray meets it from within.
+bool leaves_sheet(ivec2 hit, vec3 position, vec3 direction)
+{
+  return triangle_is_sheet(hit) && dot(triangle_shading_normal(hit, position), direction) > 0.0;
 }

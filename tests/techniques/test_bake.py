@@ -119,6 +119,21 @@ def test_a_detailed_object_is_baked_onto_a_simple_one(stage, workshop):
     assert found < 0.01
 
 
+def test_a_mirror_that_is_baked_once_shows_what_its_places_see(stage, workshop):
+    """A smooth metal cube above a floor: with one sample three of four rays started in the camera's picture."""
+    workshop.data.materials[0] = stage.principled(Base_Color=(1, 1, 1, 1), Metallic=1.0, Roughness=0.0)
+    thin = stage.principled(Alpha=0.5)  # else all points of a pixel show the same
+    stage.rectangle((-1, -1), (1, 1), 9.0, material=thin)
+    stage.camera((0, 0, 40), (0, 0, 0), 0.5)
+    inside = baked(stage, workshop, "CANDELA", "UV")[..., 3] > 0.5
+    few, many = (
+        baked(stage, workshop, "CANDELA", "GLOSSY", {"INDIRECT"}, samples=samples)[inside][:, :3].mean(axis=0)
+        for samples in (1, 16)
+    )
+    print(f"{few.round(4)} of one sample, {many.round(4)} of 16")
+    assert few == pytest.approx(many, rel=0.15)
+
+
 def test_vertices_may_be_the_target(stage):
     """A floor in the light of a sun that stands upright: its colour times 1 / pi at each corner."""
     floor = stage.rectangle((-1, -1), (1, 1), material=stage.diffuse(0.5))

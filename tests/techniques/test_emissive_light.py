@@ -1,5 +1,7 @@
 """Meshes that emit light: the same irradiance as an area light of their radiance, from both sides, with shadows."""
 
+from types import SimpleNamespace
+
 import bmesh
 import bpy
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 from addon.lighting import emissive_triangles
 from addon.lighting.emissive_triangles import along_curve, compact
 from addon.materials.energy import pane_passing
+from addon.snapshot.scene import Instance
 from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
@@ -262,6 +265,46 @@ def test_a_glowing_ball_around_the_camera_lights_what_is_in_it(stage):
     glowing_ball(stage, 30.0, 0.0)
     stage.camera_above(SPAN)
     assert irradiance(stage, 32).mean() == pytest.approx(np.pi * RADIANCE, rel=0.03)
+
+
+@pytest.mark.parametrize("scale", [(0, 0, 0), (1, 1, 0)])
+def test_a_glowing_ball_scaled_to_nothing_leaves_the_picture_alone(floor, scale):
+    """Its matrix has no inverse: pictures ended with an error."""
+    floor.light("SUN", energy=np.pi, angle=0.0)
+    glowing_ball(floor, 0.5, 1.0)
+    ball = bpy.data.objects["ball"]
+    ball.scale, ball.location.x, ball.visible_camera = scale, 50.0, True
+    lit = floor.render(2, (8, 8), bounces=1)["diffuse_direct"][..., 0]
+    assert lit == pytest.approx(np.ones((8, 8)), rel=0.03)
+
+
+@pytest.mark.parametrize(("distance", "facing"), [(0.05, 0.0), (0.15, 1.0)])
+def test_a_flat_ball_is_entered_by_the_distance_in_space(distance, facing):
+    """A camera that clips nearer than .1 m, before the flat side of a ball: by the ball's mean scale its distance was
+    taken for 22 times as much."""
+    matrix, eye = np.diag([0.01, 1, 1, 1]), np.eye(4)
+    eye[0, 3] = 0.01 + distance
+    camera = SimpleNamespace(from_above=False, bends=False, clip_start=0.1, matrix=eye)
+    frame = SimpleNamespace(
+        snapshot=SimpleNamespace(camera=camera),
+        materials=SimpleNamespace(compiled=[SimpleNamespace(transparent=False)]),
+    )
+    instance = Instance("ball", "ball", matrix, (0,))
+    assert emissive_triangles._outwards(frame, instance, ball_mesh()) == facing
+    assert emissive_triangles._outwards(frame, instance, ball_mesh(inwards=True)) == -facing
+
+
+def ball_mesh(inwards=False):
+    work = bmesh.new()
+    bmesh.ops.create_icosphere(work, subdivisions=2, radius=1.0)
+    positions = np.array([one.co for one in work.verts], np.float32)
+    triangles = np.array([[corner.index for corner in one.verts] for one in work.faces])[:, :: -1 if inwards else 1]
+    work.free()
+    return SimpleNamespace(
+        key=f"ball {inwards}", version=0, positions=positions, bounds_min=positions.min(axis=0),
+        bounds_max=positions.max(axis=0), corner_vertices=triangles.ravel(),
+        triangle_corners=np.arange(triangles.size).reshape(-1, 3), triangle_count=len(triangles),
+    )  # fmt: skip
 
 
 def test_a_faint_lamp_near_by_is_found_beside_a_strong_one_far_away(floor):

@@ -1,10 +1,13 @@
 """Wide light on what lies under a single sheet of water: radiance passes its faces unscaled, as in Cycles."""
 
+import bmesh
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from addon.compare.passes import light_paths
 from addon.materials.energy import pane_passing
+from tests.techniques.test_image_space_subsurface import scattering, slab
 
 
 def pool(stage, index=1.33, albedo=0.5, turn=(0, 0, 0), roughness=0.0):
@@ -30,6 +33,26 @@ def test_a_ground_below_water_has_the_light_that_faces_leave_and_mirror_back(sta
     radiance = 0.5 * passing / (1 - (1 - passing) * 0.5)
     straight = 1 - ((index - 1) / (index + 1)) ** 2
     assert seen(stage, 16) == pytest.approx(straight * radiance, rel=0.03)
+
+
+@pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK_SKIN"])
+def test_wax_below_water_has_the_light_of_a_ground_there(stage, method):
+    """As above: of a body that stands out of it t was taken once more, as for what enters wax in clear glass."""
+    pool(stage)
+    color = np.array([0.8, 0.5, 0.2])
+    wax = scattering(stage, method, 0.02, color=color)
+    body = slab(stage, wax)
+    body.location.z = -0.2
+    work = bmesh.new()
+    work.from_mesh(body.data)
+    bmesh.ops.create_cube(work, size=0.5, matrix=Matrix.Translation((8, 8, 0.2)))
+    work.to_mesh(body.data)
+    work.free()
+    passing = pane_passing(1.33)[1] / 1.33**2
+    expected = (1 - (0.33 / 2.33) ** 2) * color * passing / (1 - (1 - passing) * color)
+    light = light_paths(stage.render(8, (8, 8), bounces=24))["transmission_indirect"].mean(axis=(0, 1))
+    print(f"{method}: {light.round(4)}, closed form {expected.round(4)}")
+    assert light == pytest.approx(expected, rel=0.06)
 
 
 def test_frosted_water_mirrors_back_as_much_as_clear_water(stage):
