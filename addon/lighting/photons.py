@@ -32,8 +32,8 @@ their material's means and no bumps; where light leaves by the face farthest fro
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from math import gcd
 
 import numpy as np
@@ -137,7 +137,7 @@ CHOICES = 0.569840291  # from one interface's number to the next, as in caustics
 WIDE = 0.1  # tangent of half a light's angle, seen from casters, from which on one point is not like the others
 VERY_WIDE, MANY = 0.3, 128  # and from which on its image is wide, too: below so many samples it has several points
 MOST_POINTS = 4  # of a wide light in a sample, each with as much less of the grid
-MOST_ALONE = 32  # in a picture's only sample: each is blurred by the light's width over the root of their number
+MOST_IN_ALL = 32  # in a whole picture of few samples: each is blurred by the light's width over the root of all
 LEAST_SIDE, LEAST_PART = 48, 32  # photons along a side where points share a grid, and where that is a coarser one
 MOST_REACH = 2.0  # of a light, in diagonals of the casters, whose points share a map
 SPREAD_SIDE = 64  # where nothing makes light converge
@@ -170,22 +170,24 @@ class Bundle:
     traced: bool  # not by look-ups
 
 
-def _points(
-    emitter: lights.Emitter, boxes: list[tuple[np.ndarray, np.ndarray]], count: int, on_gloss: bool = False
-) -> int:
-    """How many points of a light photons of one sample come from: several of a wide one where samples are few, most
-    where it is very wide or they shine `on_gloss`, too."""
+def _width(emitter: lights.Emitter, low: np.ndarray, high: np.ndarray) -> float:
+    """Tangent of half the angle that a light spans, seen from the middle of a box."""
     if emitter.kind == lights.SUN:
-        width = float(np.tan(min(emitter.radius, 1.5)))
-    else:
-        place = emitter.position(emitter.middle())
-        far = [np.linalg.norm((low + high) / 2 - place) for low, high in boxes]
-        width = emitter.reach / max(min(far, default=np.inf), 1e-30)
-    few, most_points = (MANY, 2 * MOST_POINTS) if width > VERY_WIDE else (FEW, MOST_POINTS)
-    if width > VERY_WIDE or on_gloss:
-        most_points = max(MOST_ALONE // max(count, 1), most_points)
-    most = int(np.clip(few // max(count, 1), 1, most_points)) if width > WIDE else 1
-    return 1 << most.bit_length() - 1  # so that all of them are evenly spread
+        return float(np.tan(min(emitter.radius, 1.5)))
+    far = float(np.linalg.norm((low + high) / 2 - emitter.position(emitter.middle())))
+    return emitter.reach / max(far, 1e-30)
+
+
+def _points(width: float, count: int, most_of_few: bool, on_gloss: bool, spreads: bool) -> int:
+    """How many points of a light of this width (_width) photons of one sample come from, where `count` samples share
+    them: several of a wide one where samples are few. `most_of_few`: so many where it is very wide or photons
+    shine `on_gloss`, too, that few samples have MOST_IN_ALL together. `spreads`: nothing makes light converge."""
+    few, most = (MANY, 2 * MOST_POINTS) if width > VERY_WIDE else (FEW, MOST_POINTS)
+    if most_of_few and (width > VERY_WIDE or on_gloss):
+        most = max(MOST_IN_ALL // count, most)
+    points = min(max(few // count, 1), most) if width > WIDE else 1
+    points = 1 << points.bit_length() - 1  # so that all of them are evenly spread
+    return min(points, max(MOST_POINTS // count, 1)) if spreads else points
 
 
 def _half_width(emitter: lights.Emitter) -> float:
@@ -272,10 +274,11 @@ class Photons:
         """Views of the lights whose turn it is in this sample, `side` photons along each side; `fitted`: at most that
         many, by what shows (photon_grids.py). `turn`: how many samples had photons before, and how many have in all,
         where not all samples do and whoever asks weighs them."""
-        on_gloss = frame.shared(caustic_casters.Answered).on_gloss
         alone = frame.settings.schedule.known_total and frame.settings.samples == 1
         whole = frame.settings.schedule.known_total
         on_gloss = bool(frame.shared(caustic_casters.Answered).on_gloss)
+        kept = whole and not frame.settings.schedule.is_draft
+        asked_of = {"most_of_few": kept, "on_gloss": on_gloss, "spreads": casters.spreads}
         boxes = list(caustic_casters.boxes_of(frame, casters))
         most = min(side, SPREAD_SIDE) if casters.spreads else side
         answered, grids = self._rounds(frame, casters)[0], {}
@@ -287,29 +290,33 @@ class Photons:
                 continue
             wanted = casters.wanted(key)
             wanted |= (REFRACTED | REFLECTED) * (on_gloss and key != caustic_casters.MESHES)
-            possible = (REFRACTED, REFLECTED) if casters.refracting else (REFLECTED,)
-            lobes = tuple(lobe for lobe in possible if wanted & lobe)
-            if not lobes:
+            if not wanted:
                 continue
+            # All of them: what is wanted is told by the last interface of a path, not by the first.
+            lobes = (REFRACTED, REFLECTED) if casters.refracting else (REFLECTED,)
             sharing, of_turns = count, 0
             if turn is not None and count > 1:
                 # Sample 0 has its photons before it is known how many others do: those are a set without it.
                 index, sharing, of_turns = max(index - 1, 0), count - (index > 0), frame.settings.samples
             for (low, high), grid in zip(boxes, grids.get(id(emitter), [most] * len(boxes))):
-                parts = _points(emitter, [(low, high)], sharing, on_gloss)
-                parts = min(parts, max(MOST_POINTS // sharing, 1)) if casters.spreads else parts
+                parts_of = partial(_points, _width(emitter, low, high), **asked_of)
+                parts = parts_of(sharing)
+                first, points = index * parts, count * parts
+                if not whole:  # while a view grows, its later samples have fewer: from MANY on one each
+                    first = sum(map(parts_of, range(1, min(index, MANY) + 1))) + max(index - MANY, 0)
+                    points = first + parts
                 strata = sharing * parts if whole else 0  # 1: see _drawn
                 strata = -1 if of_turns and sharing == count else strata
                 shown = middle_view(emitter, low, high, frame.geometry.size) if parts > 1 else None
                 finest = round((32 if casters.spreads else LEAST_SIDE) * grid / most)
                 texels = max(round(grid / np.sqrt(parts)), min(max(finest, LEAST_PART), grid))
-                for number in range(index * parts, (index + 1) * parts):
+                for number in range(first, first + parts):
                     middle = alone and parts == 1
                     drawn = frame.random_volume("light", number, evenly=parts > 1 and emitter.is_flat)
-                    sample = emitter.middle() if middle else drawn_in(emitter, emitter.sample(*drawn), count * parts)
+                    sample = emitter.middle() if middle else drawn_in(emitter, emitter.sample(*drawn), points)
                     shift = frame.random("caustics/grid", number)
                     for view in views_of(emitter, sample, low, high, texels, shift, frame.geometry.size):
-                        shared = emitter, sample, view, lobes, number, count * parts, weight / parts
+                        shared = emitter, sample, view, lobes, number, points, weight / parts
                         yield LitView(*shared, strata, of_turns, shown)
 
     def _rounds(self, frame: Frame, casters: caustic_casters.Casters) -> tuple[list[lights.Emitter], int]:
@@ -392,6 +399,8 @@ class Photons:
     ) -> Iterator[Bundle]:  # fmt: skip
         """The same by look-ups in what the light's views show: the casters' nearest and farthest surfaces, and
         `receivers`, images of MAP in the view `map_block`."""
+        wanted = casters.wanted(caustic_casters.key_of(light.emitter))
+        light = replace(light, lobes=tuple(lobe for lobe in light.lobes if lobe & wanted))  # the last interface's, too
         target = self._target("_found", light.view.side, len(FOUND))
         behind = self._behind.farthest(frame, technique, light.view, casters.refracting)
         for block, bound in self._drawn(frame, technique, casters, light, 1):

@@ -25,7 +25,7 @@ from .estimate import Estimate, Summary, constant
 from .expressions import Expressions
 from .graph import Graph, Input, Node
 from .nodes.entry import Entry, Socket
-from .nodes.shader import IMPLICIT_EMISSION, UNKNOWN_SHADER
+from .nodes.shader import IMPLICIT_EMISSION, THIN, UNKNOWN_SHADER
 from .values import glsl_number
 from .volume import Medium, medium_of
 
@@ -355,10 +355,15 @@ def may_refract(graph: Graph) -> bool:
         or (
             node.type == "ShaderNodeBsdfPrincipled"
             and _not_black(node.inputs.get("Transmission Weight"))
-            and not _not_black(node.inputs.get("Thin Wall"))
+            and not _is_thin(node.inputs.get("Thin Wall"))
         )
         for node in graph.nodes.values()
     )
+
+
+def _is_thin(socket) -> bool:
+    """Whether a Principled BSDF is a thin wall for certain, from where shader_principled takes it for one."""
+    return socket is not None and socket.link is None and float(socket.value) > THIN
 
 
 def least_roughness(graph: Graph) -> float:

@@ -140,12 +140,12 @@ class DirectLight(Technique):
                 provider = self._rays
             flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
             flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
-            whole = False
-            for number in rate.points(frame.sample):
+            numbers = rate.points(frame.sample)
+            for number in numbers:
                 part = provider.part(frame, emitter, number, points)
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
                 cell = 1.0 if part else provider.cell(frame, number, points)
-                whole = cell >= 1.0 and emitter.extended and emitter.maps is None
+                whole = _is_whole(frame, emitter, provider, number, points)
                 drawn = frame.random_volume("light", number, evenly=0.0 < cell < 1.0 and emitter.is_flat)
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*drawn)
@@ -158,11 +158,14 @@ class DirectLight(Technique):
                 row[lights.LIGHT.at.flags] += lights.NARROW_FLAG * narrow
                 found.append(LightPoint(row, provider, views))
             squared = self._beside.get(emitter.light.key, np.inf)
-            if squared < lights.footprint(emitter.area, points) and not (
-                whole or narrow or emitter.light.links.passing
-            ):
+            if squared < lights.footprint(emitter.area, points) and not (narrow or emitter.light.links.passing):
+                # A sample without a point of the light leaves out what its next one does.
+                wholes = [_is_whole(frame, emitter, provider, k, points) for k in numbers or (numbers.start,)]
+                if all(wholes):
+                    continue
                 shadowed, each = int(bool(service) and emitter.light.cast_shadow), rate.per_sample
-                row = emitter.row(emitter.centre, 0, shadowed, weight * each, each, points)
+                share = weight * wholes.count(False) / len(wholes)
+                row = emitter.row(emitter.centre, 0, shadowed, share * each, each, points)
                 row[lights.LIGHT.at.flags] += flags
                 left_out.append(LightPoint(row, self._rays))
         return found, left_out
@@ -219,6 +222,14 @@ class DirectLight(Technique):
         self._unshadowed.release()
         self._sources.release()
         self._emitters = []
+
+
+def _is_whole(frame: Frame, emitter: lights.Emitter, provider, number: int, points: float) -> bool:
+    """Whether point `number` of a light stands for the light, or a part of it, in closed form (WHOLE_FLAG)."""
+    if not emitter.extended or emitter.maps is not None:
+        return False
+    part = provider.part(frame, emitter, number, points)
+    return part is not None or provider.cell(frame, number, points) >= 1.0
 
 
 def _is_near(frame: Frame, emitter: lights.Emitter) -> bool:

@@ -126,8 +126,8 @@ void main()
   vec2 main_axis = (abs(ellipse.y) > 1e-6 * larger) ? normalize(vec2(larger - ellipse.z, ellipse.y))
                  : ((ellipse.x >= ellipse.z) ? vec2(1.0, 0.0) : vec2(0.0, 1.0));
   vec3 first = main_axis.x * tangent + main_axis.y * bitangent;
+  vec3 second = cross(normal, first) * sqrt(smaller);
   first *= sqrt(larger);
-  vec3 second = cross(normal, normalize(first)) * sqrt(smaller);
   vec3 wall = NO_WALL;
 #ifdef WALLS
   int steps = int(clamp(sqrt(larger / max(apart, 1e-37)), 1.0, MOST_APART));

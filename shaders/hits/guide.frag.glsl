@@ -1,7 +1,6 @@
 // What reflections show, and what is seen through glass, for whoever filters them: how much surfaces behind the lobe
-// reflect, as it is seen in it, and in w
-// the square of its luminance, both times the `ray_share` of the rays. The mean over samples, and how uncertain that is, tell one part of a reflection from
-// another.
+// reflect, as it is seen in it, and in w the square of its luminance, both times the `ray_share` of the rays. The mean over
+// samples, and how uncertain that is, tell one part of a reflection from another.
 #include "lib/gbuffer.glsl"
 #include "hits/path.glsl"
 #include "hits/onward.glsl"

@@ -200,7 +200,7 @@ void main()
   throughput *= weight / max(kept, 1e-6);
   density = found_by_rays ? 0.0 : density;
   float most = max_component(throughput);
-  if (!(most > 1e-4) || !is_finite(most)) {
+  if (!(most > 1e-4 * ray_share) || !is_finite(most)) {
     return;
   }
   vec3 side = ((code & PATH_BENT) != 0 && !enters) ? -s.geometric_normal : side_of_ray(s, direction);

@@ -4,6 +4,9 @@
 #include "ask/view.glsl"
 #include "indirect/near.glsl"
 #include "indirect/drawn_pixel.glsl"
+#ifdef GLOSSY
+#include "caustics/gloss.glsl"
+#endif
 #ifdef SOFT
 #include "lib/soft_lobe.glsl"
 #endif
@@ -43,6 +46,7 @@ void main()
     vec3 direction = s.normal;
     vec3 side = s.geometric_normal;
     bool glossy = false;
+    bool takes_photons = false;
     vec3 start = s.position;
     if (k == 0) {
       vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
@@ -62,6 +66,7 @@ void main()
         weight = may_mirror(s, direction) ? weight / float(lobe_count) : vec3(0.0);
         side = side_of_ray(s, direction);
         glossy = true;
+        takes_photons = photons_shine != 0 && gloss_takes_photons(s);
       }
 #endif
 #ifdef SOFT
@@ -83,7 +88,7 @@ void main()
 #endif
     }
     if (max_component(weight) > 0.0) {
-      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, glossy && photons_shine != 0, roll);
+      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, takes_photons, roll);
       if (glossy) {
         out_glossy.rgb += light;
       }

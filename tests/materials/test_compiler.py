@@ -152,6 +152,13 @@ def test_a_thin_wall_bends_no_light():
     assert may_refract(pane) and not may_refract(wall)
 
 
+def test_a_wall_bends_light_where_a_node_may_say_that_it_is_not_thin():
+    """For rays, which ask its interfaces, and for whoever looks for what throws caustics."""
+    nodes = principled(Transmission_Weight=1.0, Thin_Wall=("Math", "Value")), math("Math", "ADD", 0.0, 0.0)
+    assert compiled(*nodes, surface=("Principled", "BSDF")).glass is not None
+    assert may_refract(graph(*nodes, surface=("Principled", "BSDF")))
+
+
 def test_a_missing_image_is_pink_and_said():
     material = compiled(
         image("Image", "gone"), emission(Color=("Image", "Color")), surface=("Emission", "Emission"), images={}

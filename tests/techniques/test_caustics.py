@@ -900,6 +900,27 @@ def test_switches_of_caustics_are_about_diffuse_surfaces(stage, off):
     assert found[1] == pytest.approx(found[0], rel=1e-3, abs=1e-4)
 
 
+def test_a_mirror_sends_on_what_glass_lets_pass_where_that_throws_no_caustics(stage):
+    """As in Cycles, what counts is what a diffuse surface sees next: a floor has the lamp by way of glass and a mirror,
+    not by way of glass alone."""
+    stage.floor()
+    shade = box(stage, glass(stage), (-2, -0.6, 0.1), (2, -0.5, 3))
+    mirror = box(stage, stage.principled(Metallic=1.0, Roughness=0.0), (-2, 0.5, 0), (2, 0.6, 3))
+    shade.visible_camera = mirror.visible_camera = False
+    stage.light("POINT", (0, -1, 1), energy=100.0, shadow_soft_size=0.0)
+    stage.camera_above(0.6)
+    found = [irradiance(stage, PHOTONS, samples=2, size=(8, 8)).mean()]
+    try:
+        stage.scene.cycles.caustics_refractive = False
+        found.append(irradiance(stage, PHOTONS, samples=2, size=(8, 8)).mean())
+    finally:
+        stage.scene.cycles.caustics_refractive = True
+    mirror.location.y = 50.0
+    by_glass_alone = irradiance(stage, PHOTONS, samples=2, size=(8, 8)).mean()
+    assert found[1] > 0.1 * by_glass_alone
+    assert found[1] == pytest.approx(found[0] - by_glass_alone, rel=0.05)
+
+
 @pytest.mark.parametrize("index", [1.5, 1.0])
 def test_glass_whose_caustics_are_off_stops_a_lamp(stage, index):
     """As in Cycles: diffuse surfaces do without what it would let pass, even if that bends nothing."""

@@ -6,6 +6,8 @@ import pytest
 from mathutils import Euler, Matrix
 
 from addon import engine
+from addon.sources.rates import Rate
+from addon.techniques import direct_light
 from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
@@ -374,7 +376,7 @@ def test_an_area_light_that_faces_away_gives_nothing(floor):
     assert floor.render(2)["diffuse_direct"].max() == 0
 
 
-def test_a_floor_close_to_an_area_light_has_its_light_in_one_sample(stage):
+def test_a_floor_close_to_an_area_light_has_its_light_once(stage, monkeypatch):
     """Points that all pixels share shine as from no nearer than their spacing."""
     stage.scene.candela.slot_shadow = "accumulated_maps"
     height, half = 0.05, 1.0
@@ -388,3 +390,8 @@ def test_a_floor_close_to_an_area_light_has_its_light_in_one_sample(stage):
     expected = 0.5 / np.pi * radiance * (height**2 / squared**2).sum(axis=(2, 3)).mean() * (half / 100) ** 2
     found = [stage.render(1, size=(16, 16), seed=seed)["combined"][..., :3].mean() for seed in range(3)]
     assert np.mean(found) == pytest.approx(expected, rel=0.05)  # .08 without those of pixels
+    # Nothing is left out where the lamp shines as a whole, whether a sample has a point of it or not.
+    stage.scene.candela.slot_shadow = "vssm"
+    monkeypatch.setattr(direct_light, "rate_of", lambda *_: Rate(-1))
+    found = stage.render(8, size=(16, 16))["combined"][..., :3].mean()
+    assert found == pytest.approx(expected, rel=0.05)

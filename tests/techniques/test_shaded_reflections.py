@@ -382,3 +382,12 @@ def test_a_coat_that_is_drawn_apart_lights_others(stage):
         for engine, samples in (("CANDELA", 32), ("CYCLES", 512))
     )
     assert own == pytest.approx(truth, rel=0.15)
+
+
+def test_one_sample_mirrors_faintly(stage):
+    """What a mirror of little colour shows of what is very bright."""
+    stage.floor(material=mirror(stage, 2e-4))
+    ceiling(stage, stage.material("ShaderNodeEmission", Strength=5000.0), half=9.0)
+    stage.camera_above()
+    found = stage.render(1, (8, 8), bounces=2)["combined"][..., :3]
+    assert found.mean() == pytest.approx(1.0, rel=0.05)

@@ -42,6 +42,8 @@ SUBSURFACE_METHODS = {"BURLEY": 0, "RANDOM_WALK": 1, "RANDOM_WALK_SKIN": 2, "RAN
 SUBSURFACE_REACH = {"BURLEY": 0.24, "RANDOM_WALK": 3.0, "RANDOM_WALK_SKIN": 0.6, "RANDOM_WALK_LEGACY": 0.24}
 THIN_FILM = (Socket("Thin Film Thickness", "FLOAT", layer=True), Socket("Thin Film IOR", "FLOAT", 1.33))
 
+THIN = 0.5  # from where Thin Wall is on, as in shaders/material/shader.glsl
+
 # Of red, green and blue: how far the index lies above that of yellow, in (ior - 1) / Abbe number.
 DISPERSION = (-0.1139, 0.2207, 0.9154)
 
@@ -117,7 +119,7 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
     alpha = sockets["Alpha"].clipped()
     metallic = sockets["Metallic"].clipped()
     transmission = sockets["Transmission Weight"].clipped()
-    thin = bool((sockets["Thin Wall"].high > 0.0).any())
+    thin = bool((sockets["Thin Wall"].high > THIN).any())
     transparency = alpha.complement()
     tinted, glass = False, None
     if transmission.high.any():
@@ -125,7 +127,7 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
         root = _colored("Base Color")(sockets).map(lambda value: value**0.5)
         transparency += through * root * _passing(sockets)
         tinted = not root.grey
-        if not thin:
+        if not (sockets["Thin Wall"].low > THIN).all():
             glass = _dispersed(sockets, _interface(sockets, root, float(through.mean.mean())))
     emission = alpha * sockets["Emission Strength"]
     # Images are only looked at where they matter.
