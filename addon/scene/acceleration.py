@@ -33,7 +33,7 @@ from ..kernels.scatter import scatter
 from ..snapshot.scene import Instance, Snapshot
 from . import box_tree
 from .box_tree import LEAF
-from .glass_sheets import NO_SHEETS, sheets_of
+from .glass_sheets import NO_SHEETS, SheetCache
 from .instance_tree import MOST_BOXES, OWN_TREE, RECORD_NODES, Copies, UpperTree, is_point, kept, parted
 from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
 from .on_gpu import SceneOnGpu
@@ -285,6 +285,7 @@ class HierarchyCache:
     def __init__(self):
         self._kept: dict[object, Trees] = {}
         self._meshes: dict[object, Tree] = {}  # trees of meshes' own
+        self._sheets = SheetCache()
         self._kinds: tuple[object, dict] = (None, {})  # of instances: one for each visibility among them
         self._looks: tuple[object, tuple] = (None, ())  # of materials: what decides about rays, and what they emit
 
@@ -303,7 +304,7 @@ class HierarchyCache:
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if is_met(i, path))
         if passing:
             shown = tuple(i for i in shown if i.links.blocker not in passing)
-        sheets = sheets_of(shown, snapshot.meshes, materials)  # of what moves, too: it may leave another's side
+        sheets = self._sheets.get(shown, snapshot.meshes, materials)  # of what moves, too: it may leave another's side
         key = shown, (
             None if alike else tuple(rays_met(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
@@ -396,7 +397,7 @@ class HierarchyCache:
         return None
 
     def release(self) -> None:
-        self._kept, self._meshes = {}, {}
+        self._kept, self._meshes, self._sheets = {}, {}, SheetCache()
 
 
 def _looks(instance: Instance) -> tuple:

@@ -9,7 +9,7 @@ Open parts of meshes are judged with those that they may bound a solid with:
 A group is one of sheets if its faces, summed by area, look one way: the sum is longer than ONE_SIDED of their area.
 
 Cost: numpy over the triangles of meshes with open glass, and over pairs of up to MOST_PARTS open parts; more are one
-group.
+group. Kept (SheetCache) until something of glass moves, comes or goes.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ OVERLAP = 0.5  # of the smaller one's extent, along either axis across, by which
 TOUCH = 1e-3  # of a box's diagonal, by which it may miss another one
 MOST_PARTS = 1024
 MOST_KEPT = 64  # meshes of which is kept what is open
+MOST_SETS = 8  # of instances of which sheets are kept: those that paths meet
 
 Sheets = dict[int, frozenset[int]]  # by id of an instance: parts of its mesh (open_parts) that are single sheets
 NO_SHEETS: Sheets = {}
@@ -50,15 +51,53 @@ class OpenParts:
 
 def sheets_of(shown: Iterable[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]) -> Sheets:
     """The single sheets of glass among the instances."""
-    glass = [k for k, one in enumerate(materials) if one.glass is not None and one.glass.share > ALONE]
-    shown = [one for one in shown if meshes[one.mesh].triangle_count and not set(glass).isdisjoint(one.materials)]
-    parts = _world_parts(shown, meshes, glass)
+    glass = _glass_of(materials)
+    shown = [one for one in _showing(shown, glass) if meshes[one.mesh].triangle_count]
+    parts = _world_parts(shown, meshes, [*glass])
     if parts is None:
         return {}
     found: dict[int, set[int]] = {}
     for k in np.flatnonzero(_single(parts)):
         found.setdefault(id(shown[parts.owner[k]]), set()).add(int(parts.number[k]))
     return {name: frozenset(some) for name, some in found.items()}
+
+
+class SheetCache:
+    """The single sheets of glass of a scene, for all paths."""
+
+    def __init__(self):
+        self._showing: tuple = (None, frozenset(), ())  # instances, glass, those of them that show it
+        self._found: dict[tuple, Sheets] = {}  # by the latter, glass and what their meshes are
+
+    def get(
+        self, shown: tuple[Instance, ...], meshes: dict[str, Mesh], materials: list[CompiledMaterial]
+    ) -> Sheets:  # fmt: skip
+        """As sheets_of."""
+        glass = _glass_of(materials)
+        if not glass:
+            return NO_SHEETS
+        if self._showing[0] is not shown or self._showing[1] != glass:
+            self._showing = shown, glass, tuple(_showing(shown, glass))
+        own = self._showing[2]
+        named = dict.fromkeys(one.mesh for one in own)
+        key = own, glass, tuple((meshes[name].key, meshes[name].version) for name in named)
+        if key not in self._found:
+            self._found = dict([*self._found.items()][1 - MOST_SETS :]) | {key: sheets_of(own, meshes, materials)}
+        return self._found[key]
+
+
+def _glass_of(materials: list[CompiledMaterial]) -> frozenset[int]:
+    return frozenset(k for k, one in enumerate(materials) if one.glass is not None and one.glass.share > ALONE)
+
+
+def _showing(shown: Iterable[Instance], materials: frozenset[int]) -> Iterable[Instance]:
+    """Those of the instances that show any of these materials."""
+    known: dict[tuple[int, ...], bool] = {}  # by what slots hold, which many copies share
+    for one in shown:
+        if one.materials not in known:
+            known[one.materials] = not materials.isdisjoint(one.materials)
+        if known[one.materials]:
+            yield one
 
 
 _open: dict[tuple, np.ndarray] = {}  # by what tells a mesh's content

@@ -44,7 +44,6 @@ from ..gfx.library import Program
 from ..kernels import diffusion
 from ..lighting import leaving_light, repeated_light, splatted_light, walked_light
 from ..lighting.asked import asked
-from ..lighting.caustic_casters import box_of
 from ..lighting.leaving_light import LeavingLight, LeavingService
 from ..lighting.point_light import LIGHTING, PointLight
 from ..lighting.splatted_light import Splats
@@ -64,6 +63,7 @@ from ..surfaces.hits import Hits
 from ..surfaces.scatter_means import ScatterMeans
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, LOBE_CONSTANTS, PATH_BLOCKS, GatherBindings
 
+PAIRS = 1 << 20  # of boxes that are compared at once
 RAYS_INDIRECT = 4  # of a point in a sample
 CHOICE = "surface.walked"
 IMAGES = tuple(f"surface.scatter_{name}" for name in SCATTER_IMAGES)
@@ -208,6 +208,7 @@ class ImageSpaceSubsurface(Technique):
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
         self._shapes: images.Image | None = None  # of cells: normal, depth, mean length of lines through
         self._coat: images.Image | None = None  # of cells, where anything is glass: by how much more light enters
+        self._coated: set[int] = set()  # materials of what glass may be around
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
         self._leaves: tuple[int, ...] = ()  # materials whose light is listed there
@@ -277,7 +278,7 @@ class ImageSpaceSubsurface(Technique):
         self._leaving.begin()
         # In glass, which shows them without pixels around, other methods are known from points, too.
         graphs = frame.snapshot.materials
-        walked = tuple(k for k in sorted(self._materials) if self._coat is not None or may_walk(graphs[k].graph))
+        walked = tuple(k for k in sorted(self._materials) if k in self._coated or may_walk(graphs[k].graph))
         if walked and self.points.rows:
             if moved or walked != self._leaves or self._leaving.image is None:
                 self._leaving.update(self.points, walked)
@@ -311,20 +312,37 @@ class ImageSpaceSubsurface(Technique):
         )  # fmt: skip
         self._measure_coat(frame)
 
-    def _may_be_in_glass(self, snapshot: Snapshot, glass: np.ndarray) -> bool:
-        """Whether something that scatters and something of the materials `glass` have boxes that overlap."""
-        scattering = np.array([*self._materials])
-        boxes = [
-            [box_of(one, snapshot.meshes[one.mesh]) for one in snapshot.instances if np.isin(some, one.materials).any()]
-            for some in (scattering, glass)
-        ]
-        return any((low < b).all() and (a < high).all() for low, high in boxes[0] for a, b in boxes[1])
+    def _in_glass(self, frame: Frame, glass: set[int]) -> np.ndarray:
+        """Rows of the placed instances that scatter and whose boxes overlap that of one with any material of `glass`,
+        as numbers (K,)."""
+        placed = frame.geometry.placed[0]
+        kinds = {slots: [not some.isdisjoint(slots) for some in (self._materials, glass)]
+                 for slots in {one.materials for one in placed}}  # fmt: skip
+        inside, around = (
+            np.flatnonzero(one) for one in np.reshape([kinds[one.materials] for one in placed], (-1, 2)).T
+        )
+        low, high = frame.geometry.instance_bounds
+        for _ in range(2):  # what all of the others together may meet
+            if len(inside) and len(around):
+                least, most = low[around].min(axis=0), high[around].max(axis=0)
+                inside = inside[((low[inside] < most) & (least < high[inside])).all(axis=1)]
+            inside, around = around, inside
+        found, at_once = np.zeros(len(inside), bool), max(PAIRS // max(len(inside), 1), 1)
+        for first in range(0, len(around), at_once):
+            some = around[first : first + at_once, None]
+            found |= ((low[inside] < high[some]) & (low[some] < high[inside])).all(axis=2).any(axis=0)
+        return inside[found]
 
     def _measure_coat(self, frame: Frame) -> None:
         """What clear glass around points changes of the light that enters there."""
         indices = np.array([_index_of(one) for one in frame.measured_materials], np.float32)
-        if not indices.any() or not self._may_be_in_glass(frame.snapshot, np.flatnonzero(indices)):
+        rows = self._in_glass(frame, {*np.flatnonzero(indices).tolist()}) if indices.any() else ()
+        if not len(rows):
             return
+        placed = frame.geometry.placed[0]
+        self._coated = {slot for row in rows for slot in placed[row].materials}
+        listed = np.zeros((max(len(indices), len(placed)), 4), np.float32)
+        listed[: len(indices), 0], listed[rows, 1] = indices, 1.0
         self._coat = images.pool.take(ROW, self.points.rows, "RGBA32F")
         position, normal = self.points.surface(0)
         passes.fullscreen(
@@ -332,7 +350,7 @@ class ImageSpaceSubsurface(Technique):
             textures={
                 **frame.hierarchy("shadow").textures, "point_position": position, "point_normal": normal,
                 "point_instances": self.points.instances, "scatter_means": frame.kept(ScatterMeans).image,
-                "glass_indices": images.upload_list(np.repeat(indices[:, None], 4, axis=1)),
+                "glass_indices": images.upload_list(listed),
             },
             blocks={"film_view": frame.view_block},
             constants={"offset_size": frame.offset_size, "bounces": frame.settings.bounces},
@@ -481,6 +499,7 @@ class ImageSpaceSubsurface(Technique):
             if image is not None:
                 images.pool.give(image)
         self._shapes = self._coat = None
+        self._coated = set()
 
     def _give_whole(self) -> None:
         for target in self._whole:

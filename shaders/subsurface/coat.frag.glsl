@@ -37,7 +37,9 @@ void main()
   float index = 1.0;
   float leaves = 0.0;
   float back = 0.0;
-  for (int k = 0; k < WAYS && place.w > 0.0; k++) {
+  int instance = int(point_instances_fetch(texel).z + 0.5);
+  bool may_be_within = place.w > 0.0 && glass_indices_fetch(ivec2(instance & 2047, instance >> 11)).y > 0.0;
+  for (int k = 0; k < WAYS && may_be_within; k++) {
     vec2 u = fract(vec2(to_unit(roll.x), to_unit(roll.y)) + vec2(float(k) / float(WAYS), to_unit(reverse_bits(uint(k)))));
     vec3 direction = cosine_direction(face, u);
     vec3 origin = ray_origin(place.xyz, face);

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.scene.glass_sheets import sheets_of
+from addon.scene import glass_sheets
+from addon.scene.glass_sheets import SheetCache, sheets_of
 from addon.snapshot.scene import Instance, Mesh
 
 GLASS = SimpleNamespace(glass=SimpleNamespace(share=1.0))
@@ -72,3 +73,23 @@ def test_sheets_are_told_by_what_they_bound(name):
     instances = [Instance("glass", str(size), matrix, (0,)) for size, matrix in placed]
     found = sheets_of(instances, meshes, [GLASS])
     assert [int(id(one) in found) for one in instances] == expected
+
+
+def test_sheets_are_found_once_for_all_paths_until_glass_moves(monkeypatch):
+    """They were found anew for each path of each picture, though only the camera had turned."""
+    meshes = {str(LARGE): square(LARGE)}
+    materials = [GLASS, SimpleNamespace(glass=None)]
+    pond, leaf = (Instance("thing", str(LARGE), up((0, 0, k)), (k,)) for k in (0, 1))
+    calls = []
+    find = glass_sheets._world_parts
+    monkeypatch.setattr(glass_sheets, "_world_parts", lambda *given: calls.append(1) or find(*given))
+    cache, shown = SheetCache(), (pond, leaf)
+    for _ in range(3):
+        assert id(pond) in cache.get(shown, meshes, [*materials])
+    cache.get((pond, Instance("thing", str(LARGE), up((0, 0, 5)), (1,))), meshes, materials)
+    cache.get(shown[::-1], meshes, materials)
+    assert len(calls) == 1
+    moved = Instance("thing", str(LARGE), up((0, 0, 7)), (0,))
+    assert [*cache.get((moved, leaf), meshes, materials)] == [id(moved)]
+    assert len(calls) == 2
+    assert not cache.get(shown, meshes, materials[1:] * 2) and len(calls) == 2

@@ -1,6 +1,7 @@
 """Light that leaves wax and skin goes on: to the floor, into mirrors, to other bodies."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -10,7 +11,8 @@ from addon.frame.run import Renderer
 from addon.lighting import leaving_light
 from addon.materials.energy import fresnel_dielectric, pane_passing
 from addon.snapshot import SnapshotCache, take
-from addon.techniques import make_registry
+from addon.techniques import image_space_subsurface, make_registry
+from addon.techniques.image_space_subsurface import ImageSpaceSubsurface
 from addon.ui.properties import settings_of
 from tests.techniques.foggy_stage import box, volume
 from tests.techniques.test_image_space_subsurface import WALK, scattering, shown, sphere
@@ -156,3 +158,23 @@ def test_milk_that_touches_its_glass_has_the_light_that_the_glass_mirrors_back(s
     print(f"{method}, {light}: {seen.round(4)}, closed form {expected.round(4)}")
     # Straight rays to the world pass a face as those to lamps do, .957 in place of .916.
     assert seen == pytest.approx(expected, rel=0.04 if light == "SUN" else 0.05)
+
+
+def test_what_may_be_in_glass_is_known_by_boxes(monkeypatch):
+    """As pair by pair, of any number at once."""
+    random = np.random.default_rng(1)
+    low = random.uniform(0, 10, (300, 3))
+    slots = [((0,), (1,), (0, 1), (2,))[k] for k in random.integers(0, 4, 300)]
+    high = low + random.uniform(0, 1.5, (300, 3))
+    geometry = SimpleNamespace(placed=([SimpleNamespace(materials=one) for one in slots],), instance_bounds=(low, high))
+    expected = [
+        k for k in range(300) if 0 in slots[k]
+        and any(1 in slots[j] and (low[k] < high[j]).all() and (low[j] < high[k]).all() for j in range(300))
+    ]  # fmt: skip
+    technique = ImageSpaceSubsurface()
+    technique._materials = {0}
+    for pairs in (1, 1 << 20):
+        monkeypatch.setattr(image_space_subsurface, "PAIRS", pairs)
+        assert technique._in_glass(SimpleNamespace(geometry=geometry), {1}).tolist() == expected
+        assert not len(technique._in_glass(SimpleNamespace(geometry=geometry), {3}))
+    assert 0 < len(expected) < sum(0 in one for one in slots)
