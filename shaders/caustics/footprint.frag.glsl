@@ -15,29 +15,47 @@
 #define WALL_RAYS 8
 #define LIFT 0.02     // of the shorter half axis, by which they run above the surface
 #define MOST_APART 16.0  // texels, of a photon whose end says whether there may be walls within a wide footprint
+#define FARTHER 1.42  // times the ellipse, how far they look: of the two nearest a wall's direction each meets it there
+#define ALIKE 0.7     // cosine from which two walls may be one, of which distances differ by what it lacks
 #define UPRIGHT 0.7   // cosine to the surface's normal up to which what they meet is no part of it
 
-// The nearest wall within an ellipse, in the plane where its half axes are 1: unit direction, and distance as z.
+// What stands upright on an ellipse's surface at an angle about its centre, as a plane where the half axes are 1: unit
+// direction, and distance as z.
+vec3 wall_at(float angle, vec3 origin, vec3 normal, vec3 first, vec3 second)
+{
+  vec3 way = cos(angle) * first + sin(angle) * second;
+  float unit = length(way);
+  float reach = FARTHER * unit;
+  ivec2 hit;
+  float t = trace_until(origin, way / max(unit, 1e-30), reach, 0.0, 0u, hit);
+  if (t >= reach) {
+    return NO_WALL;
+  }
+  vec3 facing = triangle_normal(hit);
+  vec2 across = vec2(dot(facing, first), dot(facing, second));
+  float off = dot(facing, way) * t / unit;
+  float size = length(across);
+  bool upright = abs(dot(facing, normal)) < UPRIGHT && size > 0.0;
+  return upright ? vec3((off < 0.0 ? -across : across) / size, abs(off) / size) : NO_WALL;
+}
+
+// The nearest wall within an ellipse that two neighbouring rays meet: what one alone meets, as a table's leg, is narrow.
 vec3 wall_in(vec3 centre, vec3 normal, vec3 first, vec3 second)
 {
   vec3 wall = NO_WALL;
   vec3 origin = centre + normal * (ray_offset(centre) + LIFT * length(second));
-  for (int k = 0; k < WALL_RAYS; k++) {
-    float angle = 2.0 * PI * (float(k) + 0.5) / float(WALL_RAYS);
-    vec3 way = cos(angle) * first + sin(angle) * second;
-    float reach = length(way);
-    ivec2 hit;
-    float t = trace_until(origin, way / max(reach, 1e-30), reach, 0.0, 0u, hit);
-    if (t < reach) {
-      vec3 facing = triangle_normal(hit);
-      vec2 across = vec2(dot(facing, first), dot(facing, second));
-      float off = dot(facing, way) * t / reach;
-      float size = length(across);
-      bool upright = abs(dot(facing, normal)) < UPRIGHT && size > 0.0;
-      if (upright && abs(off) < wall.z * size) {
-        wall = vec3((off < 0.0 ? -across : across) / size, abs(off) / size);
-      }
+  vec3 met_first = NO_WALL;
+  vec3 before = NO_WALL;
+  for (int k = 0; k <= WALL_RAYS; k++) {
+    vec3 met = met_first;
+    if (k < WALL_RAYS) {
+      met = wall_at(2.0 * PI * (float(k) + 0.5) / float(WALL_RAYS), origin, normal, first, second);
     }
+    met_first = (k == 0) ? met : met_first;
+    bool alike = dot(met.xy, before.xy) > ALIKE && abs(met.z - before.z) < 1.0 - ALIKE;
+    vec3 nearer = (met.z < before.z) ? met : before;
+    wall = (alike && nearer.z < wall.z) ? nearer : wall;
+    before = met;
   }
   return wall;
 }

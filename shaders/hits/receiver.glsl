@@ -75,7 +75,8 @@ vec3 light_left(Receiver r, uint salt, out vec3 straight, out vec3 onward)
   vec3 sent;
   vec3 part;
   vec3 same;
-  bool leaves = light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, salt, sent, part, same);
+  bool leaves = max_component(diffuse) > 0.0
+                && light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, salt, sent, part, same);
   straight = leaves ? diffuse * (vec3(1.0) - part) : diffuse;
   onward = leaves ? diffuse * (vec3(1.0) - part * (vec3(1.0) - same)) : diffuse;
   return leaves ? diffuse * part * sent : vec3(0.0);

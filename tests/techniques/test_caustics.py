@@ -11,6 +11,7 @@ import pytest
 from addon.compare.passes import light_paths
 from addon.frame import shares
 from addon.frame.ledger import RAN, SKIPPED
+from addon.gfx import images as gpu_images
 from addon.lighting import caustic_casters, light_views, photon_grids, photons
 from addon.lighting.caustic_casters import grown
 from addon.lighting.caustic_maps import CausticMaps
@@ -874,6 +875,27 @@ def test_gloss_shows_a_lamp_by_way_of_glass_without_dots(stage):
     truth = stage.render(4096, (24, 24), engine="CYCLES", bounces=4)["glossy_indirect"][..., 0]
     assert found.sum() == pytest.approx(truth.sum(), rel=0.05)
     assert np.square(found - truth).sum() < 2.0 * np.square(truth).sum()  # by rays 113
+
+
+@pytest.mark.parametrize(("width", "is_wall"), [(0.01, False), (3.0, True)])
+def test_a_thin_post_is_no_wall_to_photons(stage, monkeypatch, width, is_wall):
+    """Of what stands in the light of a ball of glass a wall alone cuts footprints off, which would be endless."""
+    walled = []
+
+    def keep(self, *given, find=photons.Photons.footprints):
+        records = find(self, *given)
+        centre, value = (gpu_images.read(records[k])[..., 3] for k in (0, 3))
+        walled.append(int(((centre != 0.0) & (value < 1.0)).sum()))
+        return records
+
+    monkeypatch.setattr(photons.Photons, "footprints", keep)
+    stage.floor()
+    ball(stage, glass(stage), radius=0.3, place=(-0.45, 0, 0.7))
+    box(stage, stage.diffuse(0.0), (0.2, -width / 2, 0), (0.21, width / 2, 0.2)).visible_camera = False
+    stage.light("POINT", (-1.4, 0, 1.6), energy=100.0, shadow_soft_size=0.15)
+    stage.camera_above(1.6)
+    irradiance(stage, PHOTONS, samples=1, size=(32, 32))
+    assert (sum(walled) > 100) == is_wall
 
 
 ENGINES = "CANDELA", "CYCLES"
