@@ -947,19 +947,23 @@ def test_a_mirror_sends_on_what_glass_lets_pass_where_that_throws_no_caustics(st
 
 def test_velvet_that_takes_no_photons_shows_what_glass_mirrors(stage, monkeypatch):
     """In averaged reflections, whether other gloss takes photons or not; what few rays find varies from run to run."""
-    velvet = stage.material("ShaderNodeBsdfSheen", Color=(1, 1, 1, 1), Roughness=0.8)
-    next(node for node in velvet.node_tree.nodes if node.type == "BSDF_SHEEN").distribution = "ASHIKHMIN"
-    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=velvet)
-    ball(stage, glass(stage), place=(0, 0.6, 0.6), segments=32)
-    stage.light("POINT", location=(0, -0.9, 1.2), energy=100, shadow_soft_size=0.2)
-    stage.camera_above(1.2)
-    candela = stage.scene.candela
-    candela.slot_caustics, candela.slot_indirect, candela.shaded_reflections_bounces = PHOTONS, "instant_radiosity", 0
-    found = []
+    candela, found = stage.scene.candela, []
     for on_gloss in (False, True):
-        monkeypatch.setattr(screen_space_photons, "_on_gloss", lambda *_, found=on_gloss: found)
+        monkeypatch.setattr(screen_space_photons, "_on_gloss", lambda *_, answer=on_gloss: answer)
+        stage.clear()
+        velvet = stage.material("ShaderNodeBsdfSheen", Color=(1, 1, 1, 1), Roughness=0.8)
+        next(node for node in velvet.node_tree.nodes if node.type == "BSDF_SHEEN").distribution = "ASHIKHMIN"
+        stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=velvet)
+        ball(stage, glass(stage), place=(0, 0.6, 0.6), segments=32)
+        stage.light("POINT", location=(0, -0.9, 1.2), energy=100, shadow_soft_size=0.2)
+        stage.camera_above(1.2)
+        candela.slot_caustics, candela.slot_indirect, candela.shaded_reflections_bounces = (
+            PHOTONS,
+            "instant_radiosity",
+            0,
+        )
         found.append(stage.render(8, (16, 16), bounces=4)["glossy_indirect"][..., 0].mean())
-    assert found[1] == pytest.approx(found[0], rel=0.3)
+    assert found[1] == pytest.approx(found[0], rel=0.5)
 
 
 @pytest.mark.parametrize("index", [1.5, 1.0])
