@@ -84,7 +84,8 @@ def wait_for_rest():
         if any(one.error for one in viewports()):
             break
         if time.monotonic() - started > REST_TIMEOUT_S:
-            raise TimeoutError(f"the viewport never rests: {[one.status() for one in viewports()]}")
+            states = [(one.status(), one.done, one.dirty, later(one)) for one in viewports()]
+            raise TimeoutError(f"the viewport never rests (status, done, dirty, looks later): {states}")
         yield 0.1
     for one in viewports():
         if one.error:
