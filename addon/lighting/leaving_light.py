@@ -53,7 +53,7 @@ LEAVING = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"),),
     constants=(
-        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("INT", "turn"),
+        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("INT", "draw_number"),
         ("INT", "in_glass"),
         ("FLOAT", "offset_size"),
     ),
@@ -141,7 +141,7 @@ class LeavingLight:
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
                 "in_glass": int(coated),
                 "walks": 1 if settings.schedule.is_draft else max(WALKS // settings.samples, 1),
-                "stride": stride_of(self._drawn), "turn": self._drawn,
+                "stride": stride_of(self._drawn), "draw_number": self._drawn,
             },
         )  # fmt: skip
         self._drawn += 1

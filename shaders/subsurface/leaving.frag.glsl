@@ -42,7 +42,7 @@ void main()
   out_red = vec4(0.0);
   out_green = vec4(0.0);
   out_blue = vec4(0.0);
-  if ((texel.y + turn) % stride != 0) {
+  if ((texel.y + draw_number) % stride != 0) {
     return;
   }
   vec4 place = point_position_fetch(texel);
