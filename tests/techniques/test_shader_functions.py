@@ -216,8 +216,8 @@ def test_air_is_as_deep_where_distances_differ_by_an_eighth_or_less(gpu_context)
     """Pixels two steps apart weigh less, in proportion to the difference of their distances, and nothing from a quarter
     of the larger one on (denoise/alike.glsl)."""
     found = evaluated(
-        "lib/math.glsl denoise/alike.glsl", "vec4(alike(Shown(3.0 + 3.0 * k), Shown(3.0), 2), alike(Shown(3.0), "
-        "Shown(3.0 + 3.0 * k), 2), 0.0, 0.0)", defines=(("OF_MEDIA", "1"),),
+        "lib/math.glsl denoise/alike.glsl", "vec4(alike(Shown(3.0 + 3.0 * k, vec3(1.0)), Shown(3.0, vec3(1.0)), 2), "
+        "alike(Shown(3.0, vec3(1.0)), Shown(3.0 + 3.0 * k, vec3(1.0)), 2), 0.0, 0.0)", defines=(("OF_MEDIA", "1"),),
     )  # fmt: skip
     k = np.arange(64) / 63
     expected = np.maximum(1 - 4 * k / (1 + k), 0)
