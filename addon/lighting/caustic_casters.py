@@ -116,7 +116,7 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     others = _other_sources(snapshot, glass, mirrors)
     if not given and not others:
         return "no lamp that casts shadows, no emissive mesh and no bright part of the world lights them"
-    boxes = np.array([box_of(one, snapshot.meshes[one.mesh]) for one in shown])
+    boxes = np.array([_box(one, snapshot.meshes[one.mesh]) for one in shown])
     low, high = groups(*grown(boxes[:, 0], boxes[:, 1]))
     keys = frozenset(light.key for light in given).union(others)
     bent = frozenset(light.key for light in given if light.caustics and flagged) if by_flags else keys
@@ -209,8 +209,7 @@ def _may_be_clear(graph: Graph) -> bool:
     )
 
 
-def box_of(instance: Instance, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Low and high corner (3,) around an instance in world space."""
+def _box(instance: Instance, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     centre, half = (mesh.bounds_min + mesh.bounds_max) / 2, (mesh.bounds_max - mesh.bounds_min) / 2
     world = instance.matrix[:3, :3] @ centre + instance.matrix[:3, 3]
     reach = np.abs(instance.matrix[:3, :3]) @ half

@@ -69,9 +69,7 @@ class SheetCache:
         self._showing: tuple = (None, frozenset(), ())  # instances, glass, those of them that show it
         self._found: dict[tuple, Sheets] = {}  # by the latter, glass and what their meshes are
 
-    def get(
-        self, shown: tuple[Instance, ...], meshes: dict[str, Mesh], materials: list[CompiledMaterial]
-    ) -> Sheets:  # fmt: skip
+    def get(self, shown: tuple[Instance, ...], meshes: dict[str, Mesh], materials: list[CompiledMaterial]) -> Sheets:
         """As sheets_of."""
         glass = _glass_of(materials)
         if not glass:

@@ -140,12 +140,11 @@ class DirectLight(Technique):
                 provider = self._rays
             flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
             flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
-            numbers = rate.points(frame.sample)
+            numbers, wholes = rate.points(frame.sample), []
             for number in numbers:
-                part = provider.part(frame, emitter, number, points)
+                part, cell, whole = _stands_for(frame, emitter, provider, number, points)
+                wholes.append(whole)
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
-                cell = 1.0 if part else provider.cell(frame, number, points)
-                whole = _is_whole(frame, emitter, provider, number, points)
                 drawn = frame.random_volume("light", number, evenly=0.0 < cell < 1.0 and emitter.is_flat)
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*drawn)
@@ -160,7 +159,7 @@ class DirectLight(Technique):
             squared = self._beside.get(emitter.light.key, np.inf)
             if squared < lights.footprint(emitter.area, points) and not (narrow or emitter.light.links.passing):
                 # A sample without a point of the light leaves out what its next one does.
-                wholes = [_is_whole(frame, emitter, provider, k, points) for k in numbers or (numbers.start,)]
+                wholes = wholes or [_stands_for(frame, emitter, provider, numbers.start, points)[-1]]
                 if all(wholes):
                     continue
                 shadowed, each = int(bool(service) and emitter.light.cast_shadow), rate.per_sample
@@ -224,12 +223,12 @@ class DirectLight(Technique):
         self._emitters = []
 
 
-def _is_whole(frame: Frame, emitter: lights.Emitter, provider, number: int, points: float) -> bool:
-    """Whether point `number` of a light stands for the light, or a part of it, in closed form (WHOLE_FLAG)."""
-    if not emitter.extended or emitter.maps is not None:
-        return False
+def _stands_for(frame: Frame, emitter: lights.Emitter, provider, number: int, points: float):
+    """Which part of a light point `number` is drawn on, if not on all of it; of that the share that the point stands
+    for; and whether it does so in closed form (WHOLE_FLAG)."""
     part = provider.part(frame, emitter, number, points)
-    return part is not None or provider.cell(frame, number, points) >= 1.0
+    cell = 1.0 if part else provider.cell(frame, number, points)
+    return part, cell, cell >= 1.0 and emitter.extended and emitter.maps is None
 
 
 def _is_near(frame: Frame, emitter: lights.Emitter) -> bool:

@@ -538,11 +538,9 @@ class ShadedReflections(Technique, BothWays):
             )
             frame.count(self, "passes")
 
-    def _add_received(
-        self, frame, rays, records, closures, sources, count, reach, transmission
-    ) -> Iterator[None]:  # fmt: skip
+    def _add_received(self, frame, rays, records, closures, sources, count, reach, transmission) -> Iterator[None]:
         """Light straight from sources, then that of other surfaces."""
-        rays_of_pixel = frame.settings.samples * self._places(frame)
+        rays_of_pixel = round(frame.settings.samples / reach["ray_share"])
         repeats = max(-(-MORE_RAYS // rays_of_pixel), 1) if reach["ray_number"] < 2 else 1
         common = {
             **closure_bindings(closures), **frame.hierarchy("diffuse").textures,

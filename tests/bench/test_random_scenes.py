@@ -105,14 +105,20 @@ def test_a_run_that_is_kept_goes_on_where_the_last_one_ended_and_figures_add_up(
     assert f"{len(first) + len(second)} scenes in 2 runs, {len(second)} wrong" in capsys.readouterr().out
 
 
-def test_a_scene_at_which_the_process_dies_is_wrong_and_the_next_run_begins_after_it(rendered, capsys, monkeypatch):
-    def dies(run, options):
+def raises_at_two(error):
+    """In place of long_runs._render: it counts, and ends a run at its third scene."""
+
+    def render(run, options):
         if run.count == 2:
-            raise SystemExit
+            raise error
         run.count += 1
 
+    return render
+
+
+def test_a_scene_at_which_the_process_dies_is_wrong_and_the_next_run_begins_after_it(rendered, capsys, monkeypatch):
     with monkeypatch.context() as changed:
-        changed.setattr(long_runs, "_render", dies)
+        changed.setattr(long_runs, "_render", raises_at_two(SystemExit))
         with pytest.raises(SystemExit):
             rendered("--keep", "--alone", "60")
     assert rendered("--keep")[0] == 3
@@ -121,13 +127,8 @@ def test_a_scene_at_which_the_process_dies_is_wrong_and_the_next_run_begins_afte
 
 
 def test_a_run_that_is_stopped_by_a_key_has_an_end(rendered, capsys, monkeypatch):
-    def stopped(run, options):
-        if run.count == 2:
-            raise KeyboardInterrupt
-        run.count += 1
-
     with monkeypatch.context() as changed:
-        changed.setattr(long_runs, "_render", stopped)
+        changed.setattr(long_runs, "_render", raises_at_two(KeyboardInterrupt))
         rendered("--keep", "--alone", "60")
     assert "2 scenes in 1 runs, 0 wrong" in capsys.readouterr().out
     assert rendered("--keep")[0] == 2

@@ -860,16 +860,21 @@ def test_a_light_guide_of_glass_loses_nothing_at_its_walls(stage):
     assert found[1] == pytest.approx(found[0], rel=0.04)
 
 
-@pytest.mark.slow
-def test_gloss_shows_a_lamp_by_way_of_glass_without_dots(stage):
-    """What a ball mirrors of a small lamp onto rough metal, and what leaves it again after reflections within, comes as
-    photons: rays of the metal's lobe, of which one in a thousand finds the lamp, leave that out."""
+def ball_over_rough_metal(stage):
+    """A small lamp, and a ball of glass beside it that throws its light on rough metal, without bounced light."""
     gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=0.4, Color=(1, 1, 1, 1))
     stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
     ball(stage, glass(stage), place=(0, 0.9, 0.6), segments=48)
     stage.light("POINT", location=(0.6, -0.9, 1.2), energy=100, shadow_soft_size=0.2)
     stage.camera_above(1.2)
     stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+
+
+@pytest.mark.slow
+def test_gloss_shows_a_lamp_by_way_of_glass_without_dots(stage):
+    """What a ball mirrors of a small lamp onto rough metal, and what leaves it again after reflections within, comes as
+    photons: rays of the metal's lobe, of which one in a thousand finds the lamp, leave that out."""
+    ball_over_rough_metal(stage)
     stage.scene.candela.use_denoise = False
     found = stage.render(16, (24, 24), bounces=4)["glossy_indirect"][..., 0]
     truth = stage.render(4096, (24, 24), engine="CYCLES", bounces=4)["glossy_indirect"][..., 0]
@@ -905,12 +910,7 @@ SWITCHES = "caustics_reflective", "caustics_refractive"
 @pytest.mark.parametrize("off", [SWITCHES[:1], SWITCHES[1:], SWITCHES], ids=str)
 def test_switches_of_caustics_are_about_diffuse_surfaces(stage, off):
     """Gloss sees the same light by way of glass, by photons, whatever Cycles' switches say."""
-    gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=0.4, Color=(1, 1, 1, 1))
-    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
-    ball(stage, glass(stage), place=(0, 0.9, 0.6), segments=48)
-    stage.light("POINT", location=(0.6, -0.9, 1.2), energy=100, shadow_soft_size=0.2)
-    stage.camera_above(1.2)
-    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    ball_over_rough_metal(stage)
     found = [stage.render(4, (24, 24), bounces=4)["glossy_indirect"][..., 0]]
     try:
         for name in off:
