@@ -15,6 +15,7 @@ from addon.lighting import probes
 from addon.sampling.sequence import point
 from addon.surfaces.reflectance import BANDS, COLUMNS, Reflectance
 from addon.techniques.instant_radiosity import DEEPER, InstantRadiosity, deeper_weight
+from tests.numerics import trapezoid
 
 SAMPLES = 32
 
@@ -81,7 +82,7 @@ def light_thrown_by_a_board(card, height, across):
         hidden = (y * across < 0) & (height * np.abs(y) < card * (np.abs(y) + abs(across)))
     x = np.linspace(-1, 1, 401)
     squared = x[:, None] ** 2 + (y - across) ** 2 + height**2
-    return np.trapezoid(np.trapezoid(height**2 / squared**2, x, axis=0) * np.where(hidden, 0, board) / np.pi, y)
+    return trapezoid(trapezoid(height**2 / squared**2, x, axis=0) * np.where(hidden, 0, board) / np.pi, y)
 
 
 def test_a_thin_lamp_on_a_board_lights_that_where_they_touch(stage, render):

@@ -17,10 +17,9 @@ from addon.surfaces import seen_layers
 from addon.techniques.airlight import SPREAD, Airlight
 from addon.ui.properties import settings_of
 from tests.materials.graphs import transparent
+from tests.numerics import trapezoid
 from tests.techniques.foggy_stage import absorber, box, fill, fog, glowing_floor, volume
 from tests.techniques.test_image_space_subsurface import sphere
-
-trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
 
 # Transmittance ------------------------------------------------------------------------------------------------------
 

@@ -11,8 +11,7 @@ from addon.kernels.diffusion import Medium
 from addon.scene.envelope import AT_ONCE, normal_envelope
 from addon.scene.pieces import octahedral_with_lift
 from addon.scene.scatter_surface import Surface
-
-trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
+from tests.numerics import trapezoid
 
 THESIS = Medium(0.1, 2.0, 0.0, 1.2)
 JENSEN = {
