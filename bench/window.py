@@ -37,6 +37,7 @@ HEAD = (
     "its draw, s",
     "dearest block, s of processor",
     "at",
+    "its programs",
 )
 COLD, MOTION = (ROOT / "tests" / "window" / f"{name}.py" for name in ("cold", "motion"))
 MOVING = ("scene", "backend", "engine", "turning, steps/s", "pixels", "playing, frames/s", "pixels")
@@ -88,7 +89,7 @@ def rows_of(scene: str, backend: str, found: dict) -> list[tuple[str, ...]]:
         (
             scene, backend, step, told(one, "first") if step == "rendered" else "", told(one, "lit"),
             told(one, "whole"), told(one, "rest"), f"{one['longest_s']:.2f}", f"{one['longest_draw_s']:.2f}",
-            f"{one.get('dearest_s', 0.0):.2f}", one["longest_at"],
+            f"{one.get('dearest_s', 0.0):.2f}", one["longest_at"], ", ".join(one.get("longest_programs", ())),
         )
         for step, one in found.items()
         if step in STEPS

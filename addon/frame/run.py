@@ -108,7 +108,7 @@ class Renderer:
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
         yield 0, 0  # a first look needs no more
-        if self.materials.upload_textures():
+        for _ in self.materials.uploading():
             yield 0, 0  # these have programs of their own
         while isinstance(agreed := self.agrees(given, settings), int):
             self._untouched = not geometry_changed  # nothing else has been changed yet that the key does not hold
@@ -118,7 +118,9 @@ class Renderer:
         device_probe.ensure(measures=agreed is settings)
         settings = agreed
         environment = self._update_environment(snapshot)
+        yield 0, 0  # so have its tables
         self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
+        yield 0, 0
         plan = make_plan(self.techniques, snapshot, settings)
         ledger.times["upload"], ledger.times["compile"] = watch.working, watch.compiling
         said = (*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes)

@@ -324,6 +324,12 @@ def has(program: Program) -> bool:
     return shader is not None
 
 
+def has_drawn(program: Program) -> bool:
+    """Whether an equal declaration is compiled and has been drawn with."""
+    shader = _shaders.get(program)
+    return shader is not None and not shader._fresh
+
+
 def kept() -> int:
     """Compiled programs that this process holds."""
     return len(_shaders)

@@ -121,15 +121,20 @@ class MaterialSet:
         if len(before) != len(self.compiled) or any(one is not other for one, other in zip(before, self.compiled)):
             self.share()
 
-    def upload_textures(self) -> bool:
-        """Upload those that are not there yet, and free those that no material has any more; whether any was uploaded.
-        Not while anything is drawn, and before anything that `bindings` gives is: this draws their levels."""
+    def upload_textures(self) -> None:
+        """Upload those that are not there yet, and free those that no material has any more. Not while anything is
+        drawn, and before anything that `bindings` gives is: this draws their levels."""
+        for _ in self.uploading():
+            pass
+
+    def uploading(self) -> Iterator[None]:
+        """The same in parts, one for each texture."""
         wanted = set(self._keys_of_images.values())
         self._images = {key: image for key, image in self._images.items() if key in wanted}
         missing = [key for key in self._keys_of_images.values() if key not in self._images]
         for key in missing:
             self._images[key] = upload_texture(self._sources, key[0], key[2])
-        return bool(missing)
+            yield
 
     def share(self) -> None:
         """Find which materials can be drawn by one program with one block."""

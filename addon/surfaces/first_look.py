@@ -89,6 +89,7 @@ FILL = passes.fullscreen_program(
     outputs=(("VEC4", "out_fine"),),
 )
 FILLED = 0.1  # radiance of a white surface that faces the eye, by the exposure, in place of indirect light
+MIRROR = 2.0  # alpha of a guide's colour whose light does not follow its side towards lamps: it has no diffuse closure
 SOLID = 0.9  # opacity from which on a surface hides what is behind
 FAINT = 0.02  # radiance, by the exposure, that is as good as black where colours are compared
 EVEN, VARIED = 1.0, 0.5  # alpha of glow: its colour is known; only the coarse picture's mean of its surface is
@@ -272,6 +273,8 @@ def _lets_pass(material: CompiledMaterial) -> bool:
 
 def _look_of(material: CompiledMaterial, guides: bool, fills: bool) -> dict[str, tuple[float, ...]]:
     solid = float(guides or not (_lets_pass(material) or material.glass is not None))
+    if guides and not material.diffuse:
+        solid = MIRROR
     front, behind = np.zeros((2, 3)) if fills or guides else _radiance_of(material)
     return {
         "flat_color": (*np.clip(material.color, 0.0, 1.0), solid), "flat_glow": (*front, 0.0),

@@ -30,7 +30,7 @@ Fails: more layers than samples look dithered; light through coloured layers cas
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,13 +38,24 @@ import numpy as np
 from ..film import points as film_points
 from ..frame.picture import Frame
 from ..frame.technique import Technique, Write
-from ..gfx import images, passes
+from ..gfx import images, library, passes
 from ..lighting.visibility import traced_roughness
 from ..sampling.lens import rim
 from ..scene.receivers import TILE, Receivers, merged
 from ..scene.view import VIEW
 from ..surfaces.baked import BakedSurface
-from ..surfaces.draw import LEFT_OUT, MARKS, OPAQUE, STOCHASTIC, SURFACES, draw_sample, draw_surfaces, lobes_kept
+from ..surfaces.draw import (
+    LEFT_OUT,
+    MARKS,
+    OPAQUE,
+    STOCHASTIC,
+    SURFACES,
+    draw_sample,
+    draw_surfaces,
+    draw_view,
+    drawing_constants,
+    lobes_kept,
+)
 
 DESCRIPTIONS = {  # the layout in full: shaders/lib/gbuffer.glsl
     "position": "Position relative to the render origin, m; whether something was hit, and held out",
@@ -86,7 +97,8 @@ class Surfaces(Technique):
     def __init__(self):
         self._drawn = False  # `begin` has left the first sample in the images
 
-    def begin(self, frame: Frame) -> None:
+    def begin(self, frame: Frame) -> Iterator[None]:
+        yield from self._first_draws(frame)
         modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
         film = next((one for one in frame.plan.techniques if film_points.POINTS in one.params), None)
         if film is not None:
@@ -119,6 +131,24 @@ class Surfaces(Technique):
             frame.shared(BakedSurface).draw(frame, self, self._target(frame))
         else:
             draw_sample(frame, self, self._target(frame))
+
+    def _first_draws(self, frame: Frame) -> Iterator[None]:
+        """In a viewport, draw each program of materials that has never been drawn with in a part of its own: that takes
+        some drivers as long as to compile it. What is drawn is not used."""
+        schedule = frame.settings.schedule
+        if not (schedule.is_draft or schedule.shows_each) or frame.snapshot.baked is not None or frame.tiles:
+            return
+        sharing: dict[library.Program, set[int]] = {}
+        for material in {draw.material for draw in frame.geometry.draws}:
+            if not frame.materials.compiled[material].bounds_alone:
+                sharing.setdefault(frame.materials.surface_program(material), set()).add(material)
+        fresh = [materials for program, materials in sharing.items() if not library.has_drawn(program)]
+        constants = drawing_constants(STOCHASTIC, lobes_kept(frame))
+        for materials in fresh[1:]:  # the first one in the picture's own draw
+            target, program_of = self._target(frame), frame.materials.surface_program
+            target.clear()
+            draw_view(frame, self, target, frame.view_block, frame.view_rows, program_of, materials, constants)
+            yield
 
     @staticmethod
     def _target(frame: Frame) -> images.Target:

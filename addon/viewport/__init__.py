@@ -126,9 +126,9 @@ def draw(engine, context, depsgraph) -> None:
 
 def _painted(viewport: Viewport) -> bool:
     """Whether the scene has to be read for an image that is shown and not saved: scripts may have written into it, of
-    which Blender tells nobody. Asked now and then."""
+    which Blender tells nobody. Asked now and then, where any image is shown."""
     now = time.monotonic()
-    if viewport.dirty or not viewport.settled:
+    if viewport.dirty or not viewport.settled or not viewport.cache.images:
         return False
     if now < viewport.images_again:
         _look_later(viewport, viewport.images_again - now)

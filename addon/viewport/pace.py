@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from ..gfx import library
 
 STEP_S = 0.08  # what a step may take while the picture changes, to stay below 0.1 s: coarser pixels are drawn for it
 STEP_SHARE = 0.8  # of the time between two pictures that Candela's own work may take
@@ -51,6 +54,23 @@ class Pace:
         finer = [one for one in SCALES if 1 < one < scale]
         quick = (one for one in finer if (self.expected(one) or np.inf) <= SHORT_S)
         return next(quick, max(finer, default=1))
+
+
+class Redraw:
+    """One redraw: it works until a time is spent."""
+
+    def __init__(self, clock: Callable[[], float], budget: float):
+        self.clock, self.budget = clock, budget  # seconds
+        self.began, self._known = clock(), library.news()
+
+    @property
+    def is_fresh(self) -> bool:
+        """Programs have been compiled in it, or were first drawn with."""
+        return library.news() != self._known
+
+    def is_over(self, ahead: float = 0.0) -> bool:
+        """Whether its time is spent, with so many seconds more."""
+        return self.clock() - self.began + ahead > self.budget
 
 
 GUIDE_SHARE = 0.35  # of a step, or of the draft where that takes longer, that finding its shapes may take

@@ -31,7 +31,7 @@ from .ahead import Ahead
 from .beginning import AT_REST, CHECKS, CLIMBS, LIGHTS, MOVES, Beginning, coarser, drawn_with, only_direct
 from .catchers import LEFT_OUT, Catchers
 from .display import Display, Place, Scene
-from .pace import SCALES, STEP_S, Pace
+from .pace import SCALES, STEP_S, Pace, Redraw
 
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
@@ -88,6 +88,7 @@ class Viewport:
         self._news = -1  # of the library, when the sample was begun
         self._within: WithinSample | None = None
         self._compiled = 0  # programs since the last whole sample
+        self._unshown: list[Callable[[Frame], None]] = []  # what is left until the last whole sample is seen
 
     @property
     def picture(self) -> images.Image | None:
@@ -172,29 +173,30 @@ class Viewport:
         """
         elsewhere = clock() - self._left_at if self._left_at is not None else 0.0
         self._pauses = self._pauses[1], elsewhere
-        called, known = clock(), library.news()
+        redraw = Redraw(clock, min(max(elsewhere, BUDGET_S), MOST_BUDGET_S))
         border = border or (0, 0, *size)
         self._prepare(source, camera, size, border, settings, clock)
-        budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S)
-        while self._begun(settings, clock, called, known, budget):
+        while self._begun(settings, redraw):
             frame, started = self.frame, clock()
-            if not self.display.holds and self._sample is None and frame.samples_done:
+            if self._unshown or self._sample is not None or not frame.samples_done:
+                pass
+            elif not self.display.holds:
                 self._resolve(frame)  # the frame outlived an error that took its picture
-            elif self._sample is None and frame.samples_done and self._is_shown_otherwise(frame):
+            elif self._is_shown_otherwise(frame):
                 # The same samples, at another time or with other settings of a `show` stage.
                 self.catchers.forget()
                 self._resolve(frame)
-            spent = self._draw_samples(frame, settings, clock, called, known, budget)
+            spent = self._draw_samples(frame, settings, redraw) if self._shows(frame, redraw) else 0.0
             self.seconds += clock() - started
-            if clock() - called + spent > budget or not self._climbs(camera, size, border, settings, clock):
+            if redraw.is_over(spent) or not self._climbs(camera, size, border, settings, clock):
                 break
         self._show_something(camera, size, border)
         self._left_at = None if self.done else clock()
         frame = self.frame
-        whole = self._beginning is None and self.scale == 1 and not self.direct
+        whole = self._beginning is None and self.scale == 1 and not self.direct and not self._unshown
         whole = whole and frame.samples_done >= settings.samples
         if whole and self.catchers.scene is not None and not self.catchers.known:
-            whole = self._caught(frame, lambda: clock() - called > budget)
+            whole = self._caught(frame, redraw.is_over)
         if whole and not self._finished:
             self._finished = True
             self.renderer.finish(frame, ())  # publishes the ledger
@@ -212,20 +214,33 @@ class Viewport:
             self._resolve(frame)
         return self.catchers.known
 
-    def _draw_samples(self, frame: Frame, settings: Settings, clock, called: float, known: int, budget: float) -> float:
+    def _draw_samples(self, frame: Frame, settings: Settings, redraw: Redraw) -> float:
         """Draw parts of samples until the budget is spent; seconds of the last one. Only a picture of this very view
         and scene may wait for its next sample, but a new program is reason enough to let Blender answer."""
         spent = 0.0
         while frame.samples_done < settings.samples:
-            spent = self._work(frame, clock, budget)
-            if self._sample is None or (frame.part_done and self.scale == 1 and self.render_pass is None):
-                self._resolve(frame)  # now: the next sample, once it has begun, changes the images that are shown
-            fresh = library.news() != known
-            if (self._waits or frame.samples_done or fresh) and clock() - called + spent > budget:
+            spent = self._work(frame, redraw.clock, redraw.budget)
+            if self._sample is None:  # shown now: the next sample, once it has begun, changes the images that are shown
+                self._unshown = [self._take, self._refine]
+                if not self._shows(frame, redraw):
+                    break
+            elif frame.part_done and self.scale == 1 and self.render_pass is None:
+                self._take(frame)
+            if (self._waits or frame.samples_done or redraw.is_fresh) and redraw.is_over(spent):
                 break
-            if self._waits and self.scale > 1 and frame.samples_done:
+            if self.scale > 1 and frame.samples_done and (self._waits or self._rests(redraw.clock)):
                 break  # the next finer one says more than another sample of this one
         return spent
+
+    def _shows(self, frame: Frame, redraw: Redraw) -> bool:
+        """Show the last whole sample; whether that is done. Its programs, too, are compiled by more than one redraw."""
+        while self._unshown:
+            if redraw.is_fresh:
+                images.finish()
+                if redraw.is_over():
+                    return False
+            self._unshown.pop(0)(frame)
+        return True
 
     def _work(self, frame: Frame, clock, budget: float) -> float:
         """One part of a sample; the seconds that it took. `_sample` is None afterwards if the sample is whole."""
@@ -253,9 +268,18 @@ class Viewport:
         return frame.plan.shown_with(frame.snapshot, frame.settings) != self.display.shown_with
 
     def _resolve(self, frame: Frame) -> None:
+        """Show the mean of the frame's samples at once."""
+        self._unshown = []
+        self._take(frame)
+        self._refine(frame)
+
+    def _take(self, frame: Frame) -> None:
         """Take the mean of the frame's samples for the picture."""
         self.display.take(frame, self._begun_for, lambda target: self._put(frame, target))
         self.was_whole |= self.scale == 1
+
+    def _refine(self, frame: Frame) -> None:
+        """Draw a draft in finer pixels."""
         if self.scale > 1 and self.render_pass is None:
             self.display.refine(frame, self._scene, self.scale, max(self.step, self._sample_seconds))
 
@@ -287,7 +311,8 @@ class Viewport:
     def _show_something(self, camera: Camera, size, border) -> None:
         """If the picture of this view is still to come, and what is shown is of another one: a first look at it."""
         begun = self._beginning
-        pending = begun is not None or not (self.frame.samples_done or self._waits)
+        shown = self.frame is not None and self.frame.samples_done and self._take not in self._unshown
+        pending = begun is not None or not (shown or self._waits)
         # A look is drawn by straight lines, of what has been placed.
         if pending and camera.panorama is None and (begun is None or begun.placed):
             self.display.look_at(camera, size, border, self._scene)
@@ -297,6 +322,7 @@ class Viewport:
         self.display.drop()
         self.catchers.forget()
         self._sample = self._beginning = None
+        self._unshown = []
         self.dirty = True
 
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
@@ -331,11 +357,12 @@ class Viewport:
 
     def _climbs(self, camera: Camera, size, border, settings: Settings, clock) -> bool:
         """Begin the same picture in finer pixels, if it rests; whether it does."""
-        if self._beginning is not None or not self.frame.samples_done:
+        if self._beginning is not None or not self.frame.samples_done or self._unshown:
             return False
-        if self._sample is not None and self.frame.samples_done < settings.samples:
-            return False  # a sample that was begun is drawn first, unless fewer are asked now
-        rests = clock() - self._changed_at > max(REST_S, 2.0 * min(self._pauses))
+        half = self._sample is not None and self.frame.samples_done < settings.samples
+        if half and (self.scale == 1 or not self._rests(clock)):
+            return False  # it is drawn first, unless fewer samples are asked now, or finer pixels come
+        rests = self._rests(clock)
         finer = self.pace.finer(self.scale) if self.scale > 1 else 1
         if self.direct and (finer == 1 or not rests):
             self._begin(LIGHTS, self.scale, camera, size, border, settings)
@@ -344,6 +371,10 @@ class Viewport:
             return False
         self._begin(CLIMBS, finer, camera, size, border, settings)
         return True
+
+    def _rests(self, clock) -> bool:
+        """Whether nothing has changed for so long that the picture is drawn in finer pixels."""
+        return clock() - self._changed_at > max(REST_S, 2.0 * min(self._pauses))
 
     def _begin(
         self, why: str, scale: int, camera: Camera, size, border, settings: Settings, reading: float = 0.0
@@ -385,8 +416,9 @@ class Viewport:
         self.held = True
         return left
 
-    def _begun(self, settings: Settings, clock, called: float, known: int, budget: float) -> bool:
+    def _begun(self, settings: Settings, redraw: Redraw) -> bool:
         """Go on with the frame that is begun, if there is one; whether there is time to draw it."""
+        clock = redraw.clock
         while self._beginning is not None:
             begun, before = self._beginning, clock()
             try:
@@ -410,9 +442,9 @@ class Viewport:
                 self._changed(begun, settings, clock)
             if not device.known() and not begun.direct:  # it is measured next, for a second: a first look comes before
                 return False
-            if library.news() != known and clock() - called > budget:
+            if redraw.is_fresh and redraw.is_over():
                 return False
-        return library.news() == known or clock() - called <= budget
+        return not (redraw.is_fresh and redraw.is_over())
 
     def _changed(self, begun: Beginning, settings: Settings, clock) -> None:
         """What is drawn has changed: begin it at a scale for that, unless that is what is begun."""
@@ -440,7 +472,7 @@ class Viewport:
         self.frame, self.scale, self._size = frame, begun.scale, begun.size
         self.direct = begun.direct
         self._within = WithinSample(frame)
-        self.seconds, self._finished, self._sample, self._compiled = 0.0, False, None, 0
+        self.seconds, self._finished, self._sample, self._compiled, self._unshown = 0.0, False, None, 0, []
         self._begun_s, self._begun_for = begun.seconds, (content(begun.camera, ("name",)), begun.size, begun.border)
         self._waits = begun.why in AT_REST
         if begun.why == CHECKS:

@@ -46,5 +46,6 @@ void main()
   for (int k = 0; k < count; k++) {
     irradiance += lamp_irradiance(k, normal);
   }
-  out_look = vec4(min(flat_color.rgb * irradiance * 0.31830989 + glow, vec3(MOST)), 1.0);
+  float follows = flat_color.w > 1.5 ? 0.0 : 1.0;  // its light is that of its side towards the lamps
+  out_look = vec4(min(flat_color.rgb * irradiance * 0.31830989 + glow, vec3(MOST)), follows);
 }

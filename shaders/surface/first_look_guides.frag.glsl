@@ -1,5 +1,6 @@
 // A coarse picture in finer pixels, by what a first look at the same view knows of them: each takes the light of the
-// nearest coarse pixels that show the same surface, by its own colour and its own side towards the lamps. What the guide
+// nearest coarse pixels that show the same surface, by its own colour and its own side towards the lamps, but for what has
+// no diffuse closure, whose mirror images do not follow these (alpha of the look: 0). What the guide
 // knows to emit is left out of coarse light and stands as the guide has it, so that small things that glow are whole.
 #define MOST_CHANGE 4.0
 #define SAME_DEPTH 0.05
@@ -26,7 +27,7 @@ void main()
   ivec2 corner = ivec2(floor(place));
   vec2 part = place - vec2(corner);
   vec4 guide_here = guide_fetch(pixel);
-  vec3 look_here = look_fetch(pixel).rgb + vec3(faint);
+  vec4 look_here = look_fetch(pixel);
   vec4 glow_here = shows_glow > 0.0 ? glow_fetch(pixel) : vec4(0.0);
   vec4 sum = vec4(0.0);
   float weights = 0.0;
@@ -47,8 +48,9 @@ void main()
       emitted += alike * coarse_emission;
       emitting += alike;
     }
-    if (guide_here.w > 0.0 && guide_there.w > 0.0) {
-      vec3 change = look_here / (look_fetch(middle).rgb + vec3(faint));
+    vec4 look_there = look_fetch(middle);
+    if (guide_here.w > 0.0 && guide_there.w > 0.0 && min(look_here.w, look_there.w) > 0.5) {
+      vec3 change = (look_here.rgb + vec3(faint)) / (look_there.rgb + vec3(faint));
       light.rgb *= clamp(change, vec3(1.0 / MOST_CHANGE), vec3(MOST_CHANGE));
     }
     sum += weight * light;

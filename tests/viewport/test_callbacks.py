@@ -293,6 +293,10 @@ def test_no_timer_of_a_viewport_outlives_it_nor_are_images_asked_in_each_redraw(
     kept.images_again = 0.0
     for _ in range(3):
         window.draw(made)
+    assert not asked and not kept.looks_later  # no image is shown: nothing is looked for, and the viewport rests
+    kept.cache.images["shown"] = None
+    for _ in range(3):
+        window.draw(made)
     assert len(asked) == 1 and kept.looks_later
     kept.held = True
     viewport._redraw_soon(kept)

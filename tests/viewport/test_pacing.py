@@ -186,6 +186,28 @@ def test_view_gets_finer_when_fewer_samples_are_asked_within_one_of_a_draft(regi
     assert region.viewport.scale == 1 and region.viewport.frame.settings.samples == 2
 
 
+def test_draft_of_a_view_that_rests_gets_finer_at_once(region, monkeypatch):
+    """Within a sample, too: else all of the draft's samples would be drawn first."""
+    region.rest()
+    bpy.context.scene.candela.viewport_samples = 64
+    region.camera = region.moved(0.1)
+    region.clock.tick = viewport.BUDGET_S / 8
+    monkeypatch.setattr(picture, "REST_S", np.inf)
+    for _ in range(50):
+        region.viewport.pace.cost = {8: 0.02, 4: 1.0, 2: 3.0, 1: 9.0}
+        region.draw()
+        if region.viewport.frame.samples_done and region.viewport._sample is not None:
+            break
+    draft = region.viewport.frame
+    assert region.viewport.scale == 8 and region.viewport._sample is not None
+    done = draft.samples_done
+    monkeypatch.undo()
+    region.clock.tick = 0.0
+    region.clock.now += 2 * viewport.REST_S
+    region.draw()
+    assert region.viewport.scale < 8 and draft.samples_done == done < 64
+
+
 @pytest.mark.parametrize(("height", "scale"), [(2000, 16), (1024, 16), (1000, 8), (300, 4), (100, 1), (20, 1)])
 def test_drafts_keep_64_pixels_from_top_to_bottom(height, scale):
     assert viewport.coarsest_for(height) == scale
@@ -283,6 +305,22 @@ def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, wh
     assert shown.sum() == pytest.approx(whole.sum(), rel=0.15)
 
 
+def test_draft_of_metal_is_nowhere_brighter_than_its_own_pixels(scene, region, whole_guides):
+    """What it mirrors does not follow a surface's side towards the lamps, by which diffuse light is drawn finer."""
+    metal = material_named("Metal")
+    metal.node_tree.nodes["Principled BSDF"].inputs["Metallic"].default_value = 1.0
+    for name in ("Cube", "Plane"):
+        bpy.data.objects[name].data.materials.append(metal)
+    region.viewport.dirty = True
+    region.rest()
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.2, 8: 0.01}
+    region.camera = region.moved(1e-4)
+    region.draw()
+    assert region.viewport.scale == 8 and region.viewport.display.shown.size == SIZE
+    fine, coarse = (images.read(one)[..., :3] for one in (region.viewport.display.shown, region.viewport.picture))
+    assert coarse.max() > 0.0 and fine.max() < 1.01 * coarse.max()
+
+
 def test_draft_shows_what_glows_behind_a_red_pane_in_red(scene, region, whole_guides):
     """What lets light pass is not in the guide: what shone behind it stood there in full, and white."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.3, location=scene.camera.matrix_world @ Vector((0.0, 0.0, -3.0)))
@@ -334,15 +372,15 @@ def test_first_sample_is_shown_as_it_grows(region, monkeypatch):
     bpy.context.scene.candela.viewport_samples = 1
     region.viewport.pace.cost = {1: 10.0, 2: 0.3, 4: 0.06}
     shown, parts = [], []
-    resolve = Viewport._resolve
+    take = Viewport._take
 
-    def resolving(self, frame):
-        resolve(self, frame)
+    def taking(self, frame):
+        take(self, frame)
         if self.scale == 1:
             parts.append(frame.part_done)
             shown.append(images.read(self.picture)[..., :3].mean())
 
-    monkeypatch.setattr(Viewport, "_resolve", resolving)
+    monkeypatch.setattr(Viewport, "_take", taking)
     region.rest()
     assert len(parts) > 2 and parts[-1] == 0.0 and all(a < b for a, b in itertools.pairwise(parts[:-1]))
     np.testing.assert_allclose(shown, shown[-1], rtol=0.05)

@@ -10,7 +10,7 @@ from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from stage import ENGINE, FOLDER, candela, picture, result, run, viewport_area, viewports, window
+from stage import ENGINE, FOLDER, candela, library, picture, result, run, viewport_area, viewports, window
 
 SAMPLES = 2
 TIMEOUT_S = 400.0  # of one step
@@ -19,7 +19,8 @@ PAUSE_S = 0.02  # between two looks; more of them would take processors from wha
 
 
 class Watch:
-    """Blender's answers since it was made: a timer runs between its own redraws."""
+    """Blender's answers since it was made: a timer runs between its own redraws. Of the longest time without one also
+    the programs that were compiled in it, or first drawn with, in their order."""
 
     def __init__(self):
         self.started = self.before = time.monotonic()
@@ -27,8 +28,19 @@ class Watch:
         self.dearest = 0.0
         self.longest, self.longest_at, self.said = 0.0, "", set()
         self.draws = []  # seconds of Candela's own part of redraws
-        self._draw = candela().draw
-        candela().draw = self._timed
+        self.programs, self.longest_programs = [], []
+        self._draw, self._compile, self._bind = candela().draw, library()._compile, library().Shader.bind
+        candela().draw, library()._compile = self._timed, self._compiling
+        library().Shader.bind = lambda shader, *given, **named: self._binding(shader, *given, **named)
+
+    def _compiling(self, program):
+        self.programs.append(program.name)
+        return self._compile(program)
+
+    def _binding(self, shader, *given, **named):
+        if shader._fresh:
+            self.programs.append(f"draws {shader.program.name}")
+        return self._bind(shader, *given, **named)
 
     def _timed(self, *arguments):
         before = time.perf_counter()
@@ -42,7 +54,8 @@ class Watch:
         self.dearest, self.worked = max(self.dearest, worked - self.worked), worked
         if now - self.before > self.longest:
             self.longest, self.longest_at = now - self.before, viewports()[0].status() if viewports() else ""
-        self.before = now
+            self.longest_programs = self.programs
+        self.before, self.programs = now, []
         if viewports():
             self.said.add(viewports()[0].status().split(" (")[0].split(",")[0])
 
@@ -56,9 +69,10 @@ class Watch:
         return time.process_time() - self.began
 
     def end(self):
-        candela().draw = self._draw
+        candela().draw, library()._compile, library().Shader.bind = self._draw, self._compile, self._bind
         return {
             "longest_s": self.longest, "dearest_s": self.dearest, "longest_at": self.longest_at,
+            "longest_programs": self.longest_programs,
             "longest_draw_s": max(self.draws, default=0.0),
             "redraws": len(self.draws), "said": sorted(self.said),
         }  # fmt: skip

@@ -67,6 +67,11 @@ def candela():
     return next(module for name, module in sys.modules.items() if name.endswith("candela.addon.viewport"))
 
 
+def library():
+    """The extension's module of programs."""
+    return next(module for name, module in sys.modules.items() if name.endswith("candela.addon.gfx.library"))
+
+
 def viewports():
     return list(candela()._viewports.values())
 
