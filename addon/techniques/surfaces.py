@@ -30,7 +30,7 @@ Fails: more layers than samples look dithered; light through coloured layers cas
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +109,7 @@ class Surfaces(Technique):
             frame.find_receivers = lambda: known.receivers
             frame.look((0.0, 0.0))
         else:
-            frame.find_receivers = self._receivers(frame, self._target(frame), modes, known, key)
+            frame.find_receivers = yield from self._receivers(frame, self._target(frame), modes, known, key)
         if modes != (STOCHASTIC,) or known.key == key:  # else what was drawn for the receivers is the first sample
             self._draw(frame)
         self._drawn = True
@@ -156,8 +156,8 @@ class Surfaces(Technique):
 
     def _receivers(
         self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...], known: _KnownReceivers, key
-    ) -> Callable[[], Receivers]:
-        """Draw what tells the receivers; what is returned reads it."""
+    ) -> Generator[None, None, Callable[[], Receivers]]:
+        """Draw what tells the receivers, in parts; what is returned reads it."""
         width, height = frame.size
         tiles = -(-width // TILE), -(-height // TILE)
         aperture = frame.snapshot.camera.aperture
@@ -169,6 +169,7 @@ class Surfaces(Technique):
                     frame.shared(BakedSurface).draw(frame, self, surfaces)
                 else:
                     draw_surfaces(frame, self, surfaces, mode, lobes_kept(frame))
+                yield
                 target = images.Target(tuple(images.pool.take(*tiles, "RGBA32F") for _ in range(2)))
                 passes.fullscreen(
                     TILE_BOUNDS,

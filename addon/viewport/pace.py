@@ -69,8 +69,10 @@ class Redraw:
         return library.news() != self._known
 
     def is_over(self, ahead: float = 0.0) -> bool:
-        """Whether its time is spent, with so many seconds more."""
-        return self.clock() - self.began + ahead > self.budget
+        """Whether its time is spent, with so many seconds more, or with as many as each new program took in it: the
+        next one may take as long."""
+        spent, new = self.clock() - self.began, library.news() - self._known
+        return spent + max(ahead, spent / new if new else 0.0) > self.budget
 
 
 GUIDE_SHARE = 0.35  # of a step, or of the draft where that takes longer, that finding its shapes may take

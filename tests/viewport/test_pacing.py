@@ -305,7 +305,7 @@ def test_draft_shows_what_glows_and_is_smaller_than_its_pixels(scene, region, wh
     assert shown.sum() == pytest.approx(whole.sum(), rel=0.15)
 
 
-def test_draft_of_metal_is_nowhere_brighter_than_its_own_pixels(scene, region, whole_guides):
+def test_draft_of_metal_is_nowhere_brighter_than_its_own_pixels_around(scene, region, whole_guides):
     """What it mirrors does not follow a surface's side towards the lamps, by which diffuse light is drawn finer."""
     metal = material_named("Metal")
     metal.node_tree.nodes["Principled BSDF"].inputs["Metallic"].default_value = 1.0
@@ -317,8 +317,13 @@ def test_draft_of_metal_is_nowhere_brighter_than_its_own_pixels(scene, region, w
     region.camera = region.moved(1e-4)
     region.draw()
     assert region.viewport.scale == 8 and region.viewport.display.shown.size == SIZE
-    fine, coarse = (images.read(one)[..., :3] for one in (region.viewport.display.shown, region.viewport.picture))
-    assert coarse.max() > 0.0 and fine.max() < 1.01 * coarse.max()
+    fine, coarse = (
+        images.read(one)[..., :3].max(axis=-1) for one in (region.viewport.display.shown, region.viewport.picture)
+    )
+    around = np.pad(coarse, 1, mode="edge")
+    height, width = coarse.shape
+    around = np.max([around[y : y + height, x : x + width] for y in range(3) for x in range(3)], axis=0)
+    assert around.max() > 0.0 and (fine < 1.01 * around.repeat(8, axis=0).repeat(8, axis=1) + 1e-3).all()
 
 
 def test_draft_shows_what_glows_behind_a_red_pane_in_red(scene, region, whole_guides):
