@@ -37,10 +37,11 @@ from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..scene.view import VIEW
+from ..surfaces.draw import surface_bindings
 
 APART = 3  # pixels, of those in the second mean
 FEW = 8  # samples at rest in a viewport: up to here it shows indirect light filtered
-MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
+MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN, MEAN_OF_LOBES, MEAN_OF_LOBES_AGAIN = (
     passes.program_of_pixels(
         f"mean of neighbours{of}",
         "neighbours/mean.glsl",
@@ -57,8 +58,16 @@ MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
         ("", ()),
         (", of reflected light", (("REFLECTED", ""),)),
         (", again", (("WITH_VARIANCE", ""),)),
+        (", of all lobes", (("REFLECTED", ""), ("LOBES", ""))),
+        (", of all lobes again", (("WITH_VARIANCE", ""), ("LOBES", ""))),
     )
 )  # fmt: skip
+COLOR = passes.fullscreen_program(
+    "color of all that is diffuse",
+    "neighbours/color.frag.glsl",
+    textures=tuple(("RGBA32F", f"surface_{guide}") for guide in ("position", "normal", "diffuse", "tint", "lobe")),
+    outputs=(("VEC4", "out_color"),),
+)
 REFLECT = passes.fullscreen_program(
     "reflected light",
     "neighbours/reflect.frag.glsl",
@@ -94,10 +103,19 @@ def smooth(frame: Frame, technique: Technique, path: str) -> None:
     """Filter an image of diffuse radiance that holds this sample alone over 13x13 pixels, if it is shown alone."""
     if not shown_alone(frame):
         return
-    with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
-        _mean(frame, MEAN_OF_REFLECTED, frame.images[path], near, 1)
-        _mean(frame, MEAN_AGAIN, near.colors[0], far, APART)
-        _reflect(frame, far.colors[0], path, "NONE")
+    lobes = frame.materials.soft
+    mean, again = (MEAN_OF_LOBES, MEAN_OF_LOBES_AGAIN) if lobes else (MEAN_OF_REFLECTED, MEAN_AGAIN)
+    with ExitStack() as stack:
+        near, far = (stack.enter_context(images.borrowed(*frame.size, "RGBA32F")) for _ in range(2))
+        color = frame.images["surface.diffuse"]
+        if lobes:
+            of_all = stack.enter_context(images.borrowed(*frame.size, "RGBA32F"))
+            surfaces = surface_bindings(frame)
+            passes.fullscreen(COLOR, of_all, textures={name: surfaces[name] for _, name in COLOR.textures})
+            color = of_all.colors[0]
+        _mean(frame, mean, frame.images[path], near, 1, color)
+        _mean(frame, again, near.colors[0], far, APART, color)
+        _reflect(frame, far.colors[0], path, "NONE", color)
     frame.count(technique, "filtered samples")
 
 
@@ -119,22 +137,23 @@ def shown_sum(frame: Frame, path: str) -> Iterator[images.Image]:
         return
     with ExitStack() as stack:
         near, far, shown = (stack.enter_context(images.borrowed(*frame.size, "RGBA32F")) for _ in range(3))
-        _mean(frame, MEAN_OF_REFLECTED, frame.held.to_show(name), near, 1, "color.diffuse")
-        _mean(frame, MEAN_AGAIN, near.colors[0], far, APART, "color.diffuse")
-        textures = {"surface_diffuse": frame.images["color.diffuse"], "arriving": far.colors[0]}
+        color = frame.images["color.diffuse"]
+        _mean(frame, MEAN_OF_REFLECTED, frame.held.to_show(name), near, 1, color)
+        _mean(frame, MEAN_AGAIN, near.colors[0], far, APART, color)
+        textures = {"surface_diffuse": color, "arriving": far.colors[0]}
         passes.fullscreen(REFLECT, shown, textures=textures)
         yield shown.colors[0]
 
 
-def _mean(frame: Frame, program, light, target: images.Target, stride: int, color="surface.diffuse") -> None:
+def _mean(frame: Frame, program, light, target: images.Target, stride: int, color: images.Image | None = None) -> None:
     surfaces = {f"surface_{name}": frame.images[f"surface.{name}"] for name in ("position", "normal")}
-    surfaces["surface_diffuse"] = frame.images[color]
+    surfaces["surface_diffuse"] = color or frame.images["surface.diffuse"]
     passes.each_pixel(
         program, target, textures={**surfaces, "light_in": light}, blocks={"film_view": frame.view_block},
         constants={"stride": stride},
     )  # fmt: skip
 
 
-def _reflect(frame: Frame, arriving: images.Image, path: str, blend: str) -> None:
-    textures = {"surface_diffuse": frame.images["surface.diffuse"], "arriving": arriving}
+def _reflect(frame: Frame, arriving: images.Image, path: str, blend: str, color: images.Image | None = None) -> None:
+    textures = {"surface_diffuse": color or frame.images["surface.diffuse"], "arriving": arriving}
     passes.fullscreen(REFLECT, frame.target(path), blend=blend, textures=textures)

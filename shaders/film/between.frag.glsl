@@ -48,8 +48,8 @@ Seen seen_of(Surface s)
   seen.position = s.position;
   seen.normal = s.normal;
   seen.kind = s.kind;
-  seen.soft = max_component(s.glossy_weight) > 0.0 && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
-  seen.color = max(s.diffuse, vec3(0.0)) + (seen.soft ? s.glossy_weight : vec3(0.0));
+  seen.soft = has_diffuse_lobe(s);
+  seen.color = diffuse_color(s);
   seen.weight = seen.soft ? vec3(0.0) : s.glossy_weight * lobe_reflectance(s);
   if (s.coated) {
     // What two lobes reflect together no colour tells: it is taken over as it is, of other such pixels.

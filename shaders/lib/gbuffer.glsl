@@ -198,6 +198,18 @@ bool soft_lobe_is_glossy(Surface s)
   return s.kind == LOBE_VELVET || (s.kind == LOBE_TOON && s.glossy_edge.x > 0.5);
 }
 
+// Whether a surface has a lobe without microfacets that belongs to the diffuse passes.
+bool has_diffuse_lobe(Surface s)
+{
+  return max_component(s.glossy_weight) > 0.0 && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
+}
+
+// Colour of all that a surface adds to the diffuse passes.
+vec3 diffuse_color(Surface s)
+{
+  return max(s.diffuse, vec3(0.0)) + (has_diffuse_lobe(s) ? s.glossy_weight : vec3(0.0));
+}
+
 // Kind and edge of a lobe, without what says that it has a coat.
 float lobe_code(vec4 lobe)
 {

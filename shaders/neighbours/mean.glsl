@@ -1,5 +1,6 @@
 // Mean of the light that arrives at 4x4 pixels `stride` apart, of those that lie on the same surface. Where there is
-// none (leaves, wires), of all that are near.
+// none (leaves, wires), of all that are near. LOBES: w of the colour is the kind of the diffuse lobe, and light of those of
+// other kinds arrives elsewhere: at leaves from behind, at hair from all sides.
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 
@@ -38,6 +39,9 @@ void run(ivec2 pixel)
       }
       vec4 position = surface_position_fetch(other);
       bool lit = position.w != 0.0 && max_component(surface_diffuse_fetch(other).rgb) > 0.0;
+#ifdef LOBES
+      lit = lit && surface_diffuse_fetch(other).w == surface_diffuse_fetch(pixel).w;
+#endif
       vec3 path = position.xyz - centre.xyz;
       if (lit) {
         vec4 light = vec4(arriving_at(other), 1.0);

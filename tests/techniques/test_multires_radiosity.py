@@ -66,6 +66,19 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     np.testing.assert_allclose(four_rows, wall_irradiance(height).reshape(16, 4).mean(axis=1), rtol=0.06)
 
 
+@pytest.mark.parametrize("samples", [1, 4])
+def test_a_translucent_wall_shows_the_light_that_falls_on_its_other_side(stage, render, samples):
+    """Neighbours of one sample make up for others, whichever lobe reflects; seen from behind, as in the test above."""
+    stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
+    corners = [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
+    stage.mesh(corners, [(0, 1, 2, 3)], material=stage.material("ShaderNodeBsdfTranslucent", Color=(1, 0.5, 0, 1)))
+    stage.light("SUN", energy=10.0, angle=0.0)
+    camera = stage.camera((-3, 0.5, 0.5), (np.pi / 2, 0, -np.pi / 2))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
+    irradiance = render(1, samples=samples).mean(axis=(0, 1)) * np.pi
+    np.testing.assert_allclose(irradiance, 8 * 0.200044 * np.array([1, 0.5, 0]), rtol=0.05)
+
+
 @pytest.mark.slow
 def test_regions_differ_little_from_the_gather_of_every_pixel_and_are_few(stage, render):
     """The same virtual lights, none of them traced."""

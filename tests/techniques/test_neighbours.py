@@ -38,7 +38,7 @@ def frame_of(gpu_context):
         frame = SimpleNamespace(
             size=(SIZE, SIZE), is_first=True, samples_done=1,
             settings=Settings(samples, schedule=FINAL if whole else AT_REST),
-            plan=SimpleNamespace(techniques=()),
+            plan=SimpleNamespace(techniques=()), materials=SimpleNamespace(soft=False),
             images={name: images.upload(np.dstack(layer).astype(np.float32)) for name, layer in layers.items()},
             view_block=Block(VIEW, **values), count=lambda *counter: None,
         )  # fmt: skip
