@@ -148,6 +148,7 @@ class Answered:
         self.known = False
         self.bright: BrightPart | None = None  # of the world
         self.on_gloss = False  # rough glossy lobes get light of lamps and the world by way of smooth glass as photons
+        self.on_soft = False  # lobes without microfacets get what diffuse surfaces get
 
 
 def of(frame: Frame) -> Casters | None:

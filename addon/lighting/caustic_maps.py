@@ -68,23 +68,27 @@ SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "
 
 
 @cache
-def at_hits_program(transmission: bool) -> Program:
+def at_hits_program(transmission: bool, soft: bool = False) -> Program:
+    """`soft`: some hits have lobes without microfacets."""
+    lobes = (*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), ("RGBA32F", "ray_direction")) if soft else SEEN
     paths = ("glossy", "transmission") if transmission else ("glossy",)
     return passes.fullscreen_program(
         "caustic map at hits",
         "caustics/at_hits.frag.glsl",
-        textures=(*SEEN, *(("RGBA32F", name) for name in ("met_path", "hit_passed", "kept_maps"))),
+        textures=(*lobes, *(("RGBA32F", name) for name in ("met_path", "hit_passed", "kept_maps"))),
         blocks=((KEPT_VIEWS, "kept_views"),),
         constants=(("INT", "map_count"), ("INT", "map_side")),
         defines=(
             ("MAP_COLUMNS", str(COLUMNS)),
             *((("TRANSMISSION", "1"),) if transmission else ()),
+            *((("SOFT", ""),) if soft else ()),
         ),
         outputs=tuple(("VEC4", f"out_{path}_indirect") for path in paths),
     )
 
 
 PROGRAMS = (INTO_MAP, KEEP, *(at_hits_program(transmission) for transmission in (False, True)))
+DECLARED = (at_hits_program(True, True),)
 
 
 @dataclass
@@ -266,8 +270,9 @@ def add_at_hits(
     textures: dict[str, images.Image],
 ) -> None:  # fmt: skip
     """Add the caustics of `maps` at hits into images of indirect light. `textures`: closures of the hits (surface_*),
-    and the paths that met them (met_path, hit_passed)."""
-    program = at_hits_program(transmission)
+    and the paths that met them (met_path, hit_passed, ray_direction)."""
+    program = at_hits_program(transmission, frame.materials.soft)
+    textures = {**textures, "energy_table": frame.materials.energy_table}
     wanted = {name for _, name in program.textures}
     bound = {name: image for name, image in textures.items() if name in wanted}
     program = asked(frame, program, bound)

@@ -19,7 +19,7 @@ place of a mask's pyramid, and all photons kept with their weight in place of ro
 
 Rough glossy lobes take photons of lamps and the world that smooth glass has let pass or mirrored, and rays of theirs
 leave those out: a ray finds a small lamp by way of glass so rarely that it is a bright dot
-(shaders/caustics/gloss.glsl).
+(shaders/caustics/gloss.glsl). Sheen, velvet, toon and translucent lobes take what diffuse closures take; fibres none.
 
 Bias, in diffuse indirect: as photons.py says. Receivers reflect evenly by their albedo. Caustics seen in mirrors and
 through glass come from maps (lighting/caustic_maps.py).
@@ -57,20 +57,21 @@ from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 
 @cache
-def splat_program(gloss: bool) -> Program:
-    """Draws photons into the picture. `gloss`: glossy lobes take them, too."""
+def splat_program(gloss: bool, soft: bool) -> Program:
+    """Draws photons into the picture. `gloss`: glossy lobes take them, too; `soft`: so do lobes without microfacets."""
+    lobes = [name for name, taken in (("GLOSS", gloss), ("SOFT", soft), ("TO_GLOSSY", gloss or soft)) if taken]
     return splats.splat_program(
         "photon splat",
         "caustics/splat.frag.glsl",
         "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w",
-        textures=(*(SURFACE_TEXTURES if gloss else SEEN), ("RGBA32F", "energy_table")),
+        textures=(*(SURFACE_TEXTURES if lobes else SEEN), ("RGBA32F", "energy_table")),
         blocks=((VIEW, "film_view"),),
-        defines=(("GLOSS", ""),) if gloss else (),
-        outputs=(("VEC4", "out_light"), *((("VEC4", "out_gloss"),) if gloss else ())),
+        defines=tuple((name, "") for name in lobes),
+        outputs=(("VEC4", "out_light"), *((("VEC4", "out_gloss"),) if lobes else ())),
     )
 
 
-DECLARED = splat_program(False), splat_program(True)
+DECLARED = splat_program(False, False), splat_program(True, False), splat_program(True, True)
 LIGHT, GLOSS = "radiance.diffuse_indirect", "radiance.glossy_indirect"
 LEAST_PIXELS = 0.92
 MAPS_APART = 4  # samples for which rays ask the same map: it costs as much as the picture's photons, and shows less
@@ -104,6 +105,7 @@ class ScreenSpacePhotons(Technique):
     def __init__(self):
         self._photons = Photons()
         self._casters: caustic_casters.Casters | None = None
+        self._splat = splat_program(False, False)
         self._turns = Turns(self)
         self._apart = KeptApart()
 
@@ -118,7 +120,7 @@ class ScreenSpacePhotons(Technique):
         return True
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return PHOTONS, WALLED, splat_program(_on_gloss(snapshot, caustic_casters.casters_of(snapshot)))
+        return PHOTONS, WALLED, splat_program(_on_gloss(snapshot, caustic_casters.casters_of(snapshot)), False)
 
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)
@@ -130,8 +132,11 @@ class ScreenSpacePhotons(Technique):
                 )
             at_once = self._photons.all_at_once(frame, self._casters)
             on_gloss = GLOSS in frame.images and _on_gloss(frame.snapshot, self._casters)
-            frame.shared(caustic_casters.Answered).on_gloss = on_gloss
-            into = (LIGHT, GLOSS) if on_gloss else (LIGHT,)
+            on_soft = GLOSS in frame.images and frame.materials.soft
+            answered = frame.shared(caustic_casters.Answered)
+            answered.on_gloss, answered.on_soft = on_gloss, on_soft
+            self._splat = splat_program(on_gloss, on_soft)
+            into = (LIGHT, GLOSS) if on_gloss or on_soft else (LIGHT,)
             self._apart.begin(frame, tuple(name.removeprefix("radiance.") for name in into))
             self._turns.begin(frame, into, at_once)
 
@@ -156,9 +161,8 @@ class ScreenSpacePhotons(Technique):
 
     def _add(self, frame: Frame, target: images.Target, light: LitView, maps: CausticMaps | None) -> Iterator[None]:
         """Photons of a light's view, into the picture and into the map that rays ask, where there is one."""
-        on_gloss = len(target.colors) > 1
-        textures = SURFACE_TEXTURES if on_gloss else SEEN
-        seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in textures}
+        on_gloss = frame.shared(caustic_casters.Answered).on_gloss
+        seen = {k: image for k, image in surface_bindings(frame).items() if ("RGBA32F", k) in self._splat.textures}
         at_hits = maps is not None and maps.wants(frame, light)
         if at_hits:
             into_kept = maps.add(frame, self, self._casters, light, self._photons)
@@ -171,7 +175,7 @@ class ScreenSpacePhotons(Technique):
             yield
             records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
             splats.draw(
-                splat_program(on_gloss),
+                self._splat,
                 target,
                 records,
                 textures={**seen, "energy_table": frame.materials.energy_table},

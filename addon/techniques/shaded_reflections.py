@@ -578,7 +578,7 @@ class ShadedReflections(Technique, BothWays):
 
     def _add_caustics(self, frame, maps, rays, records, closures, transmission) -> None:
         textures = closure_bindings(closures) | {
-            "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"],
+            "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"], "ray_direction": rays.colors[1],
         }  # fmt: skip
         target = self._target(transmission, ("indirect",), records.target.depth)
         caustic_maps.add_at_hits(frame, self, maps, target, transmission, MET, textures)

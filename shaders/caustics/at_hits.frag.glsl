@@ -1,11 +1,14 @@
 // The caustics of lights on what rays have met: what diffuse closures there reflect of the irradiance that kept maps hold
-// for their place. Of the four texels around it those count whose surface lies on the hit's plane. The maps are cells of
-// one image.
+// for their place, and with SOFT lobes without microfacets, as if it came straight from the light. Of the four texels around
+// it those count whose surface lies on the hit's plane. The maps are cells of one image.
 #include "lib/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "hits/shown.glsl"
 #include "ask/leaving.glsl"
+#ifdef SOFT
+#include "lib/soft_lobe.glsl"
+#endif
 
 // What is asked of a light's view (VIEW).
 struct KeptView {
@@ -48,6 +51,12 @@ vec3 place_of(vec2 texel, vec2 size, float depth)
   return map_view.eye.xyz + spread * across - depth * map_view.backward.xyz;
 }
 
+// Towards the light, whose view is `map_view`.
+vec3 way_to_light(vec3 position)
+{
+  return view_is_parallel(map_view.eye) ? map_view.backward.xyz : map_view.eye.xyz - position;
+}
+
 // Of the map in the cell at `corner`, whose view is `map_view`.
 vec3 irradiance_at(vec3 position, vec3 normal, ivec2 corner)
 {
@@ -57,8 +66,7 @@ vec3 irradiance_at(vec3 position, vec3 normal, ivec2 corner)
     return vec3(0.0);
   }
   // The light is on the side that the hit faces.
-  vec3 to_light = view_is_parallel(map_view.eye) ? map_view.backward.xyz : map_view.eye.xyz - position;
-  if (dot(normal, to_light) <= 0.0) {
+  if (dot(normal, way_to_light(position)) <= 0.0) {
     return vec3(0.0);
   }
   vec3 sum = vec3(0.0);
@@ -82,20 +90,35 @@ void main()
   int code = int(path.w + 0.5);
   vec4 place = surface_position_fetch(pixel);
   vec3 albedo = surface_diffuse_fetch(pixel).rgb;
-  if (code == 0 || place.w == 0.0 || max(albedo.r, max(albedo.g, albedo.b)) <= 0.0) {
+#ifdef SOFT
+  Surface s = SURFACE_READ(pixel);
+  SoftLobe soft = soft_lobe_begin(s, -ray_direction_fetch(pixel).xyz);
+  bool has_lobe = soft.exists && !soft.fibre && soft.kind != LOBE_TRANSLUCENT;
+#else
+  const bool has_lobe = false;
+#endif
+  if (code == 0 || place.w == 0.0 || (max_component(albedo) <= 0.0 && !has_lobe)) {
     return;
   }
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
   vec3 irradiance = vec3(0.0);
+  vec3 by_lobe = vec3(0.0);
   for (int cell = 0; cell < map_count; cell++) {
     map_view = view_of_cell(cell);
-    irradiance += irradiance_at(place.xyz, normal, map_side * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
+    vec3 arriving = irradiance_at(place.xyz, normal, map_side * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
+    irradiance += arriving;
+#ifdef SOFT
+    if (has_lobe && max_component(arriving) > 0.0) {
+      vec3 to_light = safe_normalize(way_to_light(place.xyz));
+      by_lobe += arriving * soft_reflection(soft, to_light) / max(dot(normal, to_light), 1e-2);
+    }
+#endif
   }
   // Light that enters surfaces elsewhere is known from their points, to which it comes straight.
   vec3 sent;
   vec3 part;
   vec3 same;
   bool leaves = light_leaves(-1, place.xyz, normal, normal, uint(pixel.x + 4096 * pixel.y), sent, part, same);
-  vec3 reflected = (leaves ? vec3(1.0) - part : vec3(1.0)) * albedo / PI * irradiance;
+  vec3 reflected = (leaves ? vec3(1.0) - part : vec3(1.0)) * albedo / PI * irradiance + by_lobe;
   show_light(code, vec4(0.0), vec4(path.rgb * hit_passed_fetch(pixel).rgb * reflected, 0.0));
 }

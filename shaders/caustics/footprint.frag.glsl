@@ -1,6 +1,5 @@
 // Footprints of photons: the ellipse that a photon's neighbours on the grid span about it (addon/lighting/photons.py), as
-// records of addon/kernels/splats.py, with 1 and where it came from in w of the centre, or .5 if glossy lobes do not take it;
-// below 0 if they alone do.
+// records of addon/kernels/splats.py, with where it came from and what takes it (caustics/arrival.glsl) in w of the centre.
 // w of the others: the wall that the footprint ends at (wall_in), by direction and distance in the ellipse; beyond it: none.
 // `film_view`: the view into which they will be drawn.
 //
@@ -153,7 +152,7 @@ void main()
     wall = wall_in(point.xyz, normal, first, second);
   }
 #endif
-  out_centre = vec4(point.xyz, (facing.z == -0.5) ? 0.5 : ((facing.z < 0.0) ? facing.z : 1.0 + facing.z));
+  out_centre = vec4(point.xyz, facing.z);
   out_first = vec4(first, wall.x);
   out_second = vec4(second, wall.y);
   out_value = vec4(flux.rgb, wall.z);

@@ -8,6 +8,7 @@
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "caustics/emission.glsl"
+#include "caustics/arrival.glsl"
 
 #define STEPS 14
 #define REFINED 3
@@ -205,6 +206,6 @@ void main()
   float light_spread = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
   float lobes = photon_light.spread.y * lobe_spread * travelled;
   out_point = vec4(from + t * onward, bends ? 1.0 : 2.0);
-  out_normal = vec4(octahedral_encode(normal), -0.5, sqrt(light_spread * light_spread + lobes * lobes));
+  out_normal = vec4(octahedral_encode(normal), arrival_encode(-onward, false, true), sqrt(light_spread * light_spread + lobes * lobes));
   out_flux = vec4(flux, sqrt(area) * (parallel ? 1.0 : (away + travelled) / away));
 }

@@ -4,9 +4,8 @@
 // bundle; see addon/lighting/photons.py.
 //
 //   point   xyz where the photon ends; w: its path and the material there as a number above 0; 0: none
-//   normal  xy of the triangle, octahedral, towards the photon; z: where the photon came from (pack_normal), if glossy lobes
-//           take it, too (caustics/gloss.glsl), less than minus that by 1 if they alone do, -.5 if they do not; w: blur that
-//           light and lobes leave to it, m
+//   normal  xy of the triangle, octahedral, towards the photon; z: where the photon came from and what takes it
+//           (caustics/arrival.glsl); w: blur that light and lobes leave to it, m
 //   flux    rgb, W; w: how far neighbours would be if nothing had bent them, m
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
@@ -14,6 +13,7 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "caustics/emission.glsl"
+#include "caustics/arrival.glsl"
 #include "indirect/mirror_color.glsl"
 #ifdef ABSORBING
 vec3 solid_absorbs(int material)
@@ -202,10 +202,9 @@ void main()
         return;
       }
       float lobes = photon_light.spread.y * photon_light.spread.y * blur_squared;
-      float came = clear ? pack_normal(-onward) : -0.5;
       out_point = vec4(position, 1.0 + mod(path * 37.0 + float(material), PATHS));
       vec2 facing = octahedral_encode((dot(normal, onward) > 0.0) ? -normal : normal);
-      out_normal = vec4(facing, to_diffuse ? came : -1.0 - came, sqrt(apart * apart + lobes));
+      out_normal = vec4(facing, arrival_encode(-onward, clear, to_diffuse), sqrt(apart * apart + lobes));
       out_flux = vec4(flux, width * (parallel ? 1.0 : (away + travelled) / away));
       return;
     }

@@ -34,7 +34,7 @@ vec3 indirect_light(Receiver r, uvec3 roll)
     walk.origin = ray_origin(position, side);
     walk.bounce = 1;
     walk.whole = false;
-    walk.gloss = false;
+    walk.gloss = walk.soft = false;
     walk.has_met = false;
     sum += weight * radiance_along(walk, glossy_radius, hash3(roll));
   }

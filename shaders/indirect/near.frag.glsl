@@ -46,7 +46,8 @@ void main()
     vec3 direction = s.normal;
     vec3 side = s.geometric_normal;
     bool glossy = false;
-    bool takes_photons = false;
+    bool gloss_takes = false;
+    bool soft_takes = false;
     vec3 start = s.position;
     if (k == 0) {
       vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
@@ -66,7 +67,7 @@ void main()
         weight = may_mirror(s, direction) ? weight / float(lobe_count) : vec3(0.0);
         side = side_of_ray(s, direction);
         glossy = true;
-        takes_photons = photons_shine != 0 && gloss_takes_photons(s);
+        gloss_takes = (photons_shine & 1) != 0 && gloss_takes_photons(s);
       }
 #endif
 #ifdef SOFT
@@ -77,6 +78,7 @@ void main()
         direction = cosine_direction(turn * soft.normal, u);
         side *= turn;
         glossy = soft.glossy;
+        soft_takes = (photons_shine & 2) != 0 && !soft.fibre;
         if (soft.fibre) {
           direction = fibre_sample(soft, vec4(to_unit(roll.x), to_unit(roll.y), u), weight);
           start = fibre_start(soft, s.position, direction, side);
@@ -88,7 +90,7 @@ void main()
 #endif
     }
     if (max_component(weight) > 0.0) {
-      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, takes_photons, roll);
+      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, gloss_takes, soft_takes, roll);
       if (glossy) {
         out_glossy.rgb += light;
       }

@@ -31,6 +31,7 @@ struct Walk {
   int bounce;   // how often light of sources has been reflected when it comes along here to what the picture shows
   bool whole;   // it brings all light of what it meets, however far that is
   bool gloss;   // it begins at a glossy lobe that takes photons (caustics/gloss.glsl)
+  bool soft;    // it begins at a lobe without microfacets that takes them as diffuse surfaces do
   bool has_met; // it has met `met` already
   Vertex met;
 };
@@ -47,7 +48,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
   reach *= none ? sqrt(float(virtual_count)) : 1.0;
   vec3 sum = vec3(0.0);
   vec3 throughput = vec3(1.0);
-  bool from_seen = walk.bounce == 1 && !walk.whole;  // from a surface of the picture, over smooth metal alone
+  bool from_seen = walk.bounce == 1 && (!walk.whole || walk.soft);  // from a surface of the picture, over smooth metal alone
   bool from_gloss = walk.bounce == 1 && walk.gloss;  // from such a lobe, over glass alone
   bool farther = false;                              // a surface has sent light along the walk by virtual lights
   for (; walk.bounce <= bounces; walk.bounce++) {
@@ -127,8 +128,8 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
 
 // Radiance that arrives at a surface that the picture shows, along a ray from surfaces nearer than the bound (from all
 // surfaces, if `whole`). Behind a `whole` ray, of a lobe, the bound is `glossy_radius`: paths between surfaces that shine
-// bring much by few, and no filter spreads that. `gloss`: as of a walk.
-vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool gloss, uvec3 roll)
+// bring much by few, and no filter spreads that. `gloss`, `soft`: as of a walk.
+vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool gloss, bool soft, uvec3 roll)
 {
   Walk walk;
   walk.origin = origin;
@@ -136,6 +137,7 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool gloss, uvec3 ro
   walk.bounce = 1;
   walk.whole = whole;
   walk.gloss = gloss;
+  walk.soft = soft;
   walk.has_met = false;
   return radiance_along(walk, whole ? glossy_radius : near_radius, roll);
 }

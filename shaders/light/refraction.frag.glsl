@@ -238,7 +238,7 @@ void main()
       rest.direction = direction;
       rest.bounce = 0;
       rest.whole = false;
-      rest.gloss = false;
+      rest.gloss = rest.soft = false;
       rest.has_met = true;
       rest.met.position = rest.origin = position;
       rest.met.normal = rest.met.lit = rest.met.turned = geometric_normal;

@@ -826,11 +826,25 @@ def test_a_pattern_colours_light_where_it_enters_glass_and_where_it_leaves(stage
     assert found[8:16, 15:20].mean((0, 1)) == pytest.approx([1.0, 0.25, 0.25], abs=0.06)
 
 
-@pytest.mark.parametrize("roughness", [0.3, 0.6])
-def test_gloss_shows_a_lamp_through_glass_that_bends_nothing_as_without_it(stage, roughness):
+def cloth(stage, distribution, roughness):
+    made = stage.material("ShaderNodeBsdfSheen", Color=(1, 1, 1, 1), Roughness=roughness)
+    next(node for node in made.node_tree.nodes if node.type == "BSDF_SHEEN").distribution = distribution
+    return made
+
+
+LOBES = {
+    "gloss of .3": lambda stage: stage.material("ShaderNodeBsdfGlossy", Roughness=0.3, Color=(1, 1, 1, 1)),
+    "gloss of .6": lambda stage: stage.material("ShaderNodeBsdfGlossy", Roughness=0.6, Color=(1, 1, 1, 1)),
+    "velvet": lambda stage: cloth(stage, "ASHIKHMIN", 0.8),
+    "sheen": lambda stage: cloth(stage, "MICROFIBER", 0.5),
+    "toon": lambda stage: stage.material("ShaderNodeBsdfToon", Color=(1, 1, 1, 1), Size=0.9, Smooth=0.1),
+}
+
+
+@pytest.mark.parametrize("lobe", LOBES)
+def test_a_lobe_shows_a_lamp_through_glass_that_bends_nothing_as_without_it(stage, lobe):
     """Photons bring what shadow rays bring without the ball, and rays of the lobe do not find the lamp once more."""
-    gloss = stage.material("ShaderNodeBsdfGlossy", Roughness=roughness, Color=(1, 1, 1, 1))
-    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=gloss)
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=LOBES[lobe](stage))
     made = ball(stage, glass(stage, 1.0), place=(0, 0, 1.0), segments=48)
     stage.light("SPOT", location=(0, 0, 2.5), shadow_soft_size=0.1, spot_size=0.8, spot_blend=0.0)
     stage.camera_above(1.2)
@@ -951,9 +965,7 @@ def test_velvet_that_takes_no_photons_shows_what_glass_mirrors(stage, monkeypatc
     for on_gloss in (False, True):
         monkeypatch.setattr(screen_space_photons, "_on_gloss", lambda *_, answer=on_gloss: answer)
         stage.clear()
-        velvet = stage.material("ShaderNodeBsdfSheen", Color=(1, 1, 1, 1), Roughness=0.8)
-        next(node for node in velvet.node_tree.nodes if node.type == "BSDF_SHEEN").distribution = "ASHIKHMIN"
-        stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=velvet)
+        stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=cloth(stage, "ASHIKHMIN", 0.8))
         ball(stage, glass(stage), place=(0, 0.6, 0.6), segments=32)
         stage.light("POINT", location=(0, -0.9, 1.2), energy=100, shadow_soft_size=0.2)
         stage.camera_above(1.2)
