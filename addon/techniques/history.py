@@ -10,8 +10,9 @@ so that n pictures of a still surface have the error of n samples. The same surf
 plane within 1.5 pixels, no farther away than six, and faces alike (within 26 degrees); n is multiplied by the share of
 the bilinear weights that is on it. Indirect light is filtered over neighbours (film/neighbours.py) when it is joined:
 over 13x13 pixels up to 2 samples, over 4x4 at 8, from 24 on not at all. On objects that move n is at most FEW, as for
-light straight from lamps where a moving object's box stands or stood before one of them; there it is kept within the
-spread of what is fresh on 5x5 pixels. (Everywhere, where the world or meshes shine.) Beside moving objects indirect
+light straight from lamps where a moving object's box stands or stood before one of them; there it counts for fewer
+where means of 5x5 pixels of it and of fresh light differ by more than noise explains (`in_time` in recall.frag.glsl).
+(Everywhere, where the world or meshes shine.) Beside moving objects indirect
 light counts for as many pictures as leave the least error, by the share of the hemisphere that a step changes. While
 lamps move n is at most LAMPS, and less where a step changes more than LAG / LAMPS of their light. After any other edit
 (and while lamps of node trees move) there is no history at all (frame/history.py); what shines is never carried.
@@ -21,7 +22,7 @@ by one process. Never in slices, with motion blur or where samples may end early
 
 | cost | per picture |
 |---|---|
-| pass | 16 + 4 fetches of history per pixel; while objects move 14 for each of them and lamp, 50 in their shadows |
+| pass | 16 + 4 fetches of history per pixel; while objects move 14 for each of them and lamp, 125 in their shadows |
 | images | 4 RGBA32F of the picture's size, kept |
 
 Bias: light that changes as things move lags by up to FEW pictures, bounced light far from them by MANY, light of lamps

@@ -15,12 +15,14 @@
 
 #define OBJECTS 5  // texel of the first one
 #define TEXELS 11  // of each
+#define LEAST_NOISE 1e-4  // relative variance of a mean over pixels; look-ups between pixels change it by about so much
 
 struct Found {
   vec3 direct;
   vec3 indirect;
   vec2 counts;  // samples that stand behind both; in parts, where only a part of the place shows the surface
   float weight;
+  ivec2 pixel;  // the nearest, of the picture before
 };
 
 vec4 table(int texel)
@@ -53,6 +55,7 @@ Found recall(vec3 position, vec3 normal, float tolerance)
   }
   ivec2 low = ivec2(floor(place));
   vec2 share = place - vec2(low);
+  found.pixel = ivec2(round(place));
   for (int k = 0; k < 4; k++) {
     ivec2 pixel = low + ivec2(k & 1, k >> 1);
     if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, size))) {
@@ -89,29 +92,41 @@ vec3 arriving(vec3 light, vec3 color)
               (color.b > 1e-3) ? light.b / color.b : 0.0);
 }
 
-// The range of fresh light on the same surface nearby: what lies far beyond it is of before something moved.
-void nearby(ivec2 pixel, vec3 position, vec3 normal, float tolerance, out vec3 low, out vec3 high)
+// Samples that history of direct light counts for, of those behind it, so that it does not lag: where its mean over 5x5
+// pixels of the surface, now at `position` and then at `position_then`, differs from that of fresh light by d, and noise
+// explains the variance v of that,
+//   1 / counted = 1 / samples + max(0, d^2 / 4v - 1)
+float in_time(ivec2 pixel, ivec2 pixel_then, vec3 position, vec3 position_then, vec3 normal, vec3 normal_then,
+              float tolerance, float samples)
 {
-  vec3 sum = vec3(0.0);
+  vec3 fresh = vec3(0.0);
   vec3 squares = vec3(0.0);
+  vec3 before = vec3(0.0);
   float count = 0.0;
   ivec2 size = surface_position_size();
+  ivec2 size_then = before_place_size();
   for (int y = -2; y <= 2; y++) {
     for (int x = -2; x <= 2; x++) {
-      ivec2 other = clamp(pixel + ivec2(x, y), ivec2(0), size - 1);
-      vec4 there = surface_position_fetch(other);
-      if (there.w != 0.0 && abs(dot(there.xyz - position, normal)) < 3.0 * tolerance) {
-        vec3 light = arriving(fresh_direct_fetch(other).rgb, surface_diffuse_fetch(other).rgb);
-        sum += light;
+      ivec2 now = clamp(pixel + ivec2(x, y), ivec2(0), size - 1);
+      ivec2 then = clamp(pixel_then + ivec2(x, y), ivec2(0), size_then - 1);
+      vec4 place = surface_position_fetch(now);
+      vec4 place_then = before_place_fetch(then);
+      if (place.w != 0.0 && abs(dot(place.xyz - position, normal)) < 3.0 * tolerance && place_then.w > 0.0
+          && abs(dot(place_then.xyz - position_then, normal_then)) < 3.0 * tolerance) {
+        vec3 light = arriving(fresh_direct_fetch(now).rgb, surface_diffuse_fetch(now).rgb);
+        fresh += light;
         squares += light * light;
+        before += before_direct_fetch(then).rgb;
         count += 1.0;
       }
     }
   }
-  vec3 mean = sum / max(count, 1.0);
-  vec3 spread = sqrt(max(squares / max(count, 1.0) - mean * mean, vec3(0.0)));
-  low = mean - spread;
-  high = mean + spread;
+  vec3 mean = fresh / max(count, 1.0);
+  vec3 variance = max(squares / max(count, 1.0) - mean * mean, vec3(0.0)) / max(count, 1.0);
+  variance = (1.0 + 1.0 / max(samples, 0.1)) * (variance + LEAST_NOISE * mean * mean);
+  vec3 apart = before / max(count, 1.0) - mean;
+  float excess = max_component(apart * apart / max(4.0 * variance, vec3(1e-12))) - 1.0;
+  return 1.0 / (1.0 / max(samples, 1e-3) + max(excess, 0.0));
 }
 
 // The part of 0..1 that is left where t * slope <= room.
@@ -217,20 +232,24 @@ void main()
   vec3 shift = table(3).xyz;
   Found found;
   found.weight = 0.0;
+  vec3 position_then = position.xyz + shift;
+  vec3 normal_then = normal;
   int moved = int(table(3).w);
   bool within = false;
   for (int k = 0; k < moved && found.weight == 0.0; k++) {
     int row = OBJECTS + TEXELS * k;
     vec3 inside = moved_by(row + 3, position.xyz);
     if (max_component(abs(inside)) < 1.0) {
-      vec3 there = moved_by(row, position.xyz);
-      vec3 turned = safe_normalize(moved_by(row, position.xyz + normal * tolerance) - there);
-      found = recall(there, turned, tolerance);
+      position_then = moved_by(row, position.xyz);
+      normal_then = safe_normalize(moved_by(row, position.xyz + normal * tolerance) - position_then);
+      found = recall(position_then, normal_then, tolerance);
       within = true;
     }
   }
   if (found.weight == 0.0) {
-    found = recall(position.xyz + shift, normal, tolerance);
+    position_then = position.xyz + shift;
+    normal_then = normal;
+    found = recall(position_then, normal_then, tolerance);
   }
   vec3 direct = arriving(new_direct.rgb, color);
   vec3 indirect = arriving(new_indirect.rgb, color);
@@ -240,11 +259,8 @@ void main()
     counts.y = within ? counts.y : min(counts.y, most_beside(position.xyz, moved));
     counts = min(counts, vec2(table(4).z));
     if (table(4).w > 0.0 || (moved > 0 && may_have_changed(position.xyz, shift, moved))) {
-      counts.x = min(counts.x, most_moved);
-      vec3 low;
-      vec3 high;
-      nearby(pixel, position.xyz, normal, tolerance, low, high);
-      found.direct = clamp(found.direct, low, high);
+      counts.x = in_time(pixel, found.pixel, position.xyz, position_then, normal, normal_then, tolerance,
+                         min(counts.x, most_moved));
     }
     direct = mix(found.direct, direct, 1.0 / (1.0 + counts.x));
     indirect = mix(found.indirect, indirect, 1.0 / (1.0 + counts.y));

@@ -183,6 +183,33 @@ def test_light_is_kept_near_fresh_light_only_where_something_moves_before_a_lamp
     assert 0.05 < (counts[counts > 0] <= FEW + 1).mean() < 0.95
 
 
+def test_a_shadow_does_not_stay_where_a_moving_object_no_longer_throws_it(scene, drafts):
+    """Of what the light changed by in three steps about a fifth is left, where it is lit or shadowed anew; a quarter
+    where history only stayed within the spread of fresh light. What is true: the mean of drafts without history."""
+    lamp = next(one for one in scene.objects if one.type == "LIGHT")
+    lamp.data.shadow_soft_size = 0.6
+    cube, shown, true, number = bpy.data.objects["Cube"], {}, {}, 0
+    cube.location.z += 1.0
+    for step in range(10):
+        cube.location.x += 0.1
+        shown[step] = images.read(drafts().images["history.direct"])[..., :3].mean(axis=2)
+    for step in (6, 9):
+        cube.location.x += 0.1 * (step - 9)
+        drawn = []
+        for _ in range(32):
+            number += 1  # another setting: no history, another seed
+            frame = drafts(seed=number, values={("instant_radiosity", "rays"): 2 + number % 2})
+            assert samples_behind(frame).max() == 1.0
+            drawn.append(images.read(frame.images["history.direct"])[..., :3].mean(axis=2))
+        true[step] = np.mean(drawn, axis=0)
+        cube.location.x -= 0.1 * (step - 9)
+    change = true[6] - true[9]
+    far = np.abs(change) > 0.3 * true[9].max()
+    assert far.sum() > 10
+    left = ((shown[9] - true[9]) * np.sign(change))[far].sum() / np.abs(change)[far].sum()
+    assert left < 0.22
+
+
 def test_history_counts_by_how_much_of_a_place_shows_the_surface(drafts):
     """Between the pixels of the picture before, of which some show another surface next to outlines."""
     drafts()
