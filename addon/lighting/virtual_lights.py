@@ -251,11 +251,14 @@ class VirtualLights:
 
     def path_bindings(self, frame: Frame) -> dict:
         """What shaders/indirect/path.glsl needs: textures, blocks and constants of this sample."""
-        hierarchy = frame.hierarchy("diffuse")
+        hierarchy, reflectance = frame.hierarchy("diffuse"), frame.kept(Reflectance)
+        if hierarchy.has_sheets:
+            bright, seen = bright_world(frame), frame.snapshot.world.visibility.diffuse
+            reflectance.show_sky(frame.environment, (bright.threshold if bright else np.inf) if seen else -1.0)
         return {
             "textures": {
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
-                **hierarchy.textures, "reflectance": frame.kept(Reflectance).image,
+                **hierarchy.textures, "reflectance": reflectance.image,
             },
             "blocks": {"film_view": frame.view_block, "sources": self._source_block},
             "constants": {

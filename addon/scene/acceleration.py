@@ -90,6 +90,11 @@ class Hierarchy:
         return {"trace_nodes": self.nodes, "trace_leaves": self.leaves}
 
     @property
+    def has_sheets(self) -> bool:
+        """Whether some glass is a single sheet (glass_sheets.py)."""
+        return set(SHEETS) <= set(self.leaves.defines)
+
+    @property
     def bytes(self) -> int:
         return self.nodes.bytes + self.leaves.bytes
 

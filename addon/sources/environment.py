@@ -79,6 +79,19 @@ class Environment:
             self._known = images.upload(known.texels()), len(known.bright)
         return self._known
 
+    def mean_radiance(self, rows: int, columns: int, most: float = np.inf) -> np.ndarray:
+        """(rows, columns, 3) W / (m2 sr), of cells of equal solid angle in the world's own frame, by height from the
+        nadir and by azimuth from -pi on, without what is of more luminance than `most`."""
+        fine = 6  # places of a cell along each side
+        z = (np.arange(fine * rows) + 0.5) / (fine * rows) * 2 - 1
+        azimuth = ((np.arange(fine * columns) + 0.5) / (fine * columns) - 0.5) * 2 * np.pi
+        ring = np.sqrt(1 - z * z)[:, None]
+        up = np.broadcast_to(z[:, None], (len(z), len(azimuth)))
+        directions = np.stack([ring * np.cos(azimuth), ring * np.sin(azimuth), up], axis=-1)
+        radiance = self._light_cells.radiance[self._light_cells.of(directions @ self.rotation.T)]
+        radiance = np.where((radiance @ LUMINANCE > most)[..., None], 0.0, radiance)
+        return radiance.reshape(rows, fine, columns, fine, 3).mean(axis=(1, 3))
+
     @property
     def is_shut_out(self) -> bool:
         """Whether so little of the light reaches what the camera sees that what it does not see is lit from there, too:

@@ -92,6 +92,14 @@ class WorldCells:
         column = np.searchsorted(self._columns, np.minimum(np.floor(u * width), width - 1), side="right") - 1
         return row * COLUMNS + column
 
+    @property
+    def radiance(self) -> np.ndarray:
+        """(C, 3) means."""
+        height, width = self._size
+        z = np.sin((np.append(self._rows, height) / height - 0.5) * np.pi)
+        across = np.diff(np.append(self._columns, width)) * (2 * np.pi / width)
+        return self.light / (np.diff(z)[:, None] * across).reshape(-1, 1)
+
     @staticmethod
     def centres() -> np.ndarray:
         """(C, 3) directions, of the image's own frame."""

@@ -25,12 +25,14 @@ from ..scene.culling import calls
 from ..scene.materials import SURFACE_IMAGES
 from ..scene.overview import DIRECTIONS, overview, some
 from ..scene.view import STRAIGHT, VIEW
+from ..sources.environment import Environment
 from .draw import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
 
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
 MOST_CELLS = 32  # that are averaged one by one
 BANDS = 9  # of rows in the result, as in shaders/indirect/bands.glsl
+SKY_ROWS = 8  # above them, of the world's wide light, as there
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
 VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
 REFLECTANCE = passes.fullscreen_program(
@@ -55,6 +57,7 @@ class Reflectance:
 
     def __init__(self):
         self._keys: dict[int, object] = {}  # by material: of what its cell shows
+        self._sky: tuple = ()  # what the rows of the world show
         self.image: images.Image | None = None
         self.mirrors_box = np.zeros((2, 3))  # corners around all that mirrors, relative to the scene's origin
         self._defines: tuple[tuple[str, str], ...] = ()  # of the image, by what materials do
@@ -73,10 +76,10 @@ class Reflectance:
     def _update(self, frame: Frame) -> None:
         keys = keys_of(frame)
         rows = -(-len(frame.materials.compiled) // COLUMNS)
-        kept = self.image is not None and self.image.size == (COLUMNS, BANDS * rows)
+        kept = self.image is not None and self.image.size == (COLUMNS, BANDS * rows + SKY_ROWS)
         if not kept:
             self.release()
-            self.image = images.pool.take(COLUMNS, BANDS * rows, "RGBA32F")
+            self.image = images.pool.take(COLUMNS, BANDS * rows + SKY_ROWS, "RGBA32F")
         changed = [material for material, key in keys.items() if self._keys.get(material) != key]
         self._keys = keys
         if kept and not changed:
@@ -95,7 +98,7 @@ class Reflectance:
                 constants = drawing_constants(STOCHASTIC, False)
                 draw_overview(frame, target, (*corner, SIDE, SIDE), material, direction, program, {}, constants)
         cells = [(k % COLUMNS, band * rows + k // COLUMNS, 1, 1) for k in changed for band in range(BANDS)]
-        for viewport in cells if few else [None]:
+        for viewport in cells if few else [(0, 0, COLUMNS, BANDS * rows)]:
             self._average(frame, seen, viewport, rows, mirrors=0)
         for k in filter(lambda k: _throws_caustics(frame, k), changed):
             for band in (0, 1):  # those whose fourth number is about mirrors
@@ -115,11 +118,22 @@ class Reflectance:
             constants={"extent": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE, "mirrors": mirrors},
         )
 
+    def show_sky(self, environment: Environment, most: float) -> None:
+        """Put the world's wide light above the bands, for rays that sheets of glass mirror: without what is of more
+        luminance than `most`, W / (m2 sr)."""
+        if self._sky != (environment, most):
+            self._sky = environment, most
+            texels = np.zeros((self.image.size[1], COLUMNS, 4))
+            texels[-SKY_ROWS:, :, :3] = environment.mean_radiance(SKY_ROWS, COLUMNS, most)
+            sky = images.upload(texels)
+            viewport = (0, self.image.size[1] - SKY_ROWS, COLUMNS, SKY_ROWS)
+            passes.fullscreen(passes.COPY, images.Target((self.image,)), viewport=viewport, textures={"original": sky})
+
     def release(self) -> None:
         if self.image is not None:
             self.image.defines = ()
             images.pool.give(self.image)
-        self.image, self._keys = None, {}
+        self.image, self._keys, self._sky = None, {}, ()
 
 
 def _throws_caustics(frame: Frame, material: int) -> bool:

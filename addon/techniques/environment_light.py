@@ -379,7 +379,7 @@ def _has_sheets(frame: Frame) -> bool:
     """Whether some glass is a single sheet, which lets pass less of the world's light than its faces do."""
     glass = any(frame.materials.compiled[k].glass is not None for k in frame.snapshot.used_materials)
     hierarchy = frame.hierarchy("shadow") if glass else None
-    return hierarchy is not None and set(acceleration.SHEETS) <= set(hierarchy.leaves.defines)
+    return hierarchy is not None and hierarchy.has_sheets
 
 
 def _cast_shadows(frame: Frame) -> bool:

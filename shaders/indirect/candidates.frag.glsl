@@ -35,7 +35,8 @@ void main()
   vec3 later = vec3(0.0);
   vec3 later_shorter = vec3(0.0);
   vec3 throughput = vec3(1.0);
-  bool mirrored = false;  // the path goes on by a mirror
+  bool mirrored = false;    // the path goes on by a mirror
+  bool from_sheet = false;  // by a sheet of glass, from within
   // The first surface and the next ones by the same calls: compilers hold the code of each.
   for (int bounce = 1; bounce <= max(bounces, 1) && max_component(throughput) > 1e-4; bounce++) {
     if (bounce > 1) {
@@ -72,6 +73,10 @@ void main()
       origin = ray_origin(lit_position(met), met.lit);
     }
     if (!trace_vertex(origin, direction, 1e29, 0.0, roll.z, met, t)) {
+#ifdef GLASS_SHEETS
+      later += from_sheet ? throughput * met.passed * wide_sky(direction) : vec3(0.0);
+      later_shorter = later;
+#endif
       break;
     }
     if (bounce > 1) {
@@ -102,6 +107,9 @@ void main()
 #ifdef SMOOTH_MIRRORS
     // The roll after this one is the onward direction's.
     mirrored = bounce > 1 && mirror_drawn(met, -direction, to_unit(hash3(roll ^ uvec3(0x9E3779B9u)).x), true);
+#endif
+#ifdef GLASS_SHEETS
+    from_sheet = mirrored && met.within;
 #endif
     vec3 sent = direct_reflected(met, -direction, (bounce == 1) ? 4 : 1, roll.x);
     if (bounce == 1) {

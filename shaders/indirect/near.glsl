@@ -51,7 +51,8 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
   bool from_seen = walk.bounce == 1 && (!walk.whole || walk.soft);  // from a surface of the picture, over smooth metal alone
   bool from_gloss = walk.bounce == 1 && walk.gloss;  // from such a lobe, over glass alone
   bool farther = false;                              // a surface has sent light along the walk by virtual lights
-  for (; walk.bounce <= bounces; walk.bounce++) {
+  bool from_sheet = false;                           // a sheet of glass has mirrored it, from within
+  for (; walk.bounce <= bounces || from_sheet; walk.bounce++) {
     float share = 1.0;
     bool mirrored = false;
     if (!walk.has_met) {
@@ -59,6 +60,13 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       float limit = walk.whole ? 1e29 : reach;
       float last_mirror = mirror_limit(walk.origin, walk.direction);
       if (!trace_vertex(walk.origin, walk.direction, limit, last_mirror, roll.z, walk.met, t)) {
+#ifdef GLASS_SHEETS
+        vec3 passing = walk.met.passed * passing_media(walk.origin, walk.direction, FARTHEST_MEDIUM, roll.y);
+        sum += from_sheet ? throughput * passing * wide_sky(walk.direction) : vec3(0.0);
+#endif
+        break;
+      }
+      if (walk.bounce > bounces) {
         break;
       }
       share = walk.whole ? 1.0 : max(1.0 - t * t / (reach * reach), 0.0);
@@ -92,6 +100,9 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       walk.direction = mirror_sample(walk.met, -walk.direction, vec2(to_unit(roll.x), to_unit(roll.y)), reflected);
       throughput *= reflected;
       walk.origin = ray_origin(walk.met.position, walk.met.normal);
+#ifdef GLASS_SHEETS
+      from_sheet = walk.met.within;
+#endif
       continue;
     }
 #endif
@@ -115,7 +126,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       farther = true;
     }
     from_seen = walk.bounce == 0;
-    from_gloss = false;
+    from_gloss = from_sheet = false;
     roll = hash3(roll);
     vec3 reflected;
     vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));

@@ -44,6 +44,9 @@ struct Vertex {
   vec3 mirror_normal;
   vec3 mirror_share;
 #endif
+#ifdef GLASS_SHEETS
+  bool within;  // a sheet of glass from within
+#endif
 };
 
 // Pixel of the picture in which a point of a surface lies that faces the camera; false if there is none. What the pixel
@@ -161,6 +164,27 @@ bool may_be_mirror(ivec2 hit, vec3 position, vec3 direction)
 #endif
 }
 
+#ifdef GLASS_SHEETS
+// What a sheet of glass mirrors of a ray from within that meets it at this cosine, over the share of even light that it stops.
+float sheet_mirrors(ivec2 hit, float cosine)
+{
+  float sides = mod(-leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)], SIDES * SIDES);
+  vec2 passing = vec2(1.0) - vec2(floor(sides / SIDES), mod(sides, SIDES)) / (SIDES - 1.0);
+  float leaving = min(passing.x, passing.y);  // over n2 as many directions
+  float ior = sqrt(leaving / max(passing.x, passing.y));
+  return fresnel_dielectric(cosine, ior) / max(1.0 - leaving, 1e-3);
+}
+
+// Radiance of the world's wide light: that which does not arrive as photons.
+vec3 wide_sky(vec3 direction)
+{
+  float azimuth = (direction.x == 0.0 && direction.y == 0.0) ? 0.0 : atan(direction.y, direction.x);
+  ivec2 cell = ivec2(vec2(0.5 + azimuth / (2.0 * PI), 0.5 + 0.5 * direction.z) * vec2(SKY_COLUMNS, SKY_ROWS));
+  cell = clamp(cell, ivec2(0), ivec2(SKY_COLUMNS, SKY_ROWS) - 1);
+  return reflectance_fetch(ivec2(cell.x, reflectance_size().y - SKY_ROWS + cell.y)).rgb;
+}
+#endif
+
 // Whether a ray that meets this has met smooth metal, and how it mirrors.
 void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
 {
@@ -171,10 +195,13 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
   met.mirror_normal = met.normal;
   met.mirror_share = vec3(0.0);
 #ifdef GLASS_SHEETS
-  // From below a sheet of water rays pass with the chance that light from there leaves it: all others it mirrors.
-  for (bool within = leaves_sheet(hit, met.position, direction); within; within = is_mirror = false) {
+  // From below a sheet of water rays pass with the chance that even light from there leaves it. What it mirrors of those that
+  // it stops goes by Fresnel's reflectance: most by total reflection.
+  met.within = leaves_sheet(hit, met.position, direction);
+  for (bool within = met.within; within; within = is_mirror = false) {
     met.reflection.diffuse = vec3(0.0);
-    met.reflection.straight = met.reflection.grazing = met.mirror_share = vec3(1.0);
+    met.reflection.straight = met.reflection.grazing = vec3(1.0);
+    met.mirror_share = vec3(sheet_mirrors(hit, dot(direction, met.normal)));
     met.mirror_alpha = 0.0;
   }
 #endif
@@ -374,13 +401,19 @@ float even_share(Vertex met)
   return 1.0 - 0.87 * (1.0 - met.upright);
 }
 
-// What reflects light straight from this source: not the lobe where photons bring what that mirrors.
+// What reflects light straight from this source: not the lobe where photons bring what that mirrors, nor, of the world, where
+// rays that a sheet of glass mirrors find it.
 Reflection straight_reflection(Vertex met, Light light)
 {
   Reflection reflection = met.reflection;
   reflection.diffuse *= met.straight;
 #ifdef MIRRORS_OWNED
   if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
+    reflection.straight = reflection.grazing = vec3(0.0);
+  }
+#endif
+#ifdef GLASS_SHEETS
+  if (met.within && LIGHT_IS(light, LIGHT_DIRECTION)) {
     reflection.straight = reflection.grazing = vec3(0.0);
   }
 #endif

@@ -261,6 +261,9 @@ void main()
 #ifdef SMOOTH_MIRRORS
       rest.met.mirror_alpha = -1.0;
 #endif
+#ifdef GLASS_SHEETS
+      rest.met.within = false;
+#endif
       out_indirect.rgb += throughput * radiance_along(rest, glossy_radius, roll);
       break;
     }

@@ -85,3 +85,24 @@ def test_a_window_elsewhere_leaves_a_pond_as_it_is(stage):
     stage.scene.camera.location.z = -0.05
     light = light_paths(stage.render(8, (16, 16), bounces=0))["diffuse_direct"].mean()
     assert light == pytest.approx(0.5 * pane_passing(1.33)[1] / 1.33**2, rel=0.03)
+
+
+def test_the_middle_of_a_round_pool_has_the_sky_that_comes_in_beside_it(stage):
+    """At depth h in a pool of radius R without walls even light comes in below the rim, from heights up to atan(h / R),
+    and mirrored by the sheet, where all is reflected, up to atan(2 h / R): of a cosine's light the squares of their
+    sines. What passes the sheet is t, as above, and what the ground sends up comes back with 1 - t."""
+    depth, radius, albedo = 0.3, 1.5, 0.05
+    turns = np.arange(64) * 2 * np.pi / 64
+    rim = np.stack([radius * np.cos(turns), radius * np.sin(turns), 0 * turns], axis=-1)
+    glass = stage.material("ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0, IOR=1.33)
+    stage.mesh(rim, [range(64)], material=glass)
+    stage.mesh(rim - (0, 0, depth), [range(64)], material=stage.diffuse(albedo))
+    stage.world()
+    stage.camera_above(0.2, -0.05)
+    beside = np.sin(np.arctan(2 * depth / radius)) ** 2
+    passing = pane_passing(1.33)[1] / 1.33**2
+    expected = albedo * (beside + passing) / (1 - (1 - passing) * albedo)
+    paths = light_paths(stage.render(32, (8, 8), bounces=8))
+    light = sum(paths[name].mean() for name in ("diffuse_direct", "diffuse_indirect"))
+    print(f"{light:.4f}, closed form {expected:.4f}")
+    assert light == pytest.approx(expected, rel=0.04)
