@@ -50,7 +50,7 @@ def test_wax_below_water_has_the_light_of_a_ground_there(stage, method):
     work.free()
     passing = pane_passing(1.33)[1] / 1.33**2
     expected = (1 - (0.33 / 2.33) ** 2) * color * passing / (1 - (1 - passing) * color)
-    light = light_paths(stage.render(8, (8, 8), bounces=24))["transmission_indirect"].mean(axis=(0, 1))
+    light = light_paths(stage.render(24, (8, 8), bounces=24))["transmission_indirect"].mean(axis=(0, 1))
     print(f"{method}: {light.round(4)}, closed form {expected.round(4)}")
     assert light == pytest.approx(expected, rel=0.06)
 
@@ -90,7 +90,8 @@ def test_a_window_elsewhere_leaves_a_pond_as_it_is(stage):
 def test_the_middle_of_a_round_pool_has_the_sky_that_comes_in_beside_it(stage):
     """At depth h in a pool of radius R without walls even light comes in below the rim, from heights up to atan(h / R),
     and mirrored by the sheet, where all is reflected, up to atan(2 h / R): of a cosine's light the squares of their
-    sines. What passes the sheet is t, as above, and what the ground sends up comes back with 1 - t."""
+    sines. What passes the sheet is t, as above, and what the ground sends up comes back with 1 - t. Rays of the world
+    pass straight, so that .02 of it crosses the sheet's plane beside it (.85 without what the sheet mirrors)."""
     depth, radius, albedo = 0.3, 1.5, 0.05
     turns = np.arange(64) * 2 * np.pi / 64
     rim = np.stack([radius * np.cos(turns), radius * np.sin(turns), 0 * turns], axis=-1)
@@ -105,4 +106,4 @@ def test_the_middle_of_a_round_pool_has_the_sky_that_comes_in_beside_it(stage):
     paths = light_paths(stage.render(32, (8, 8), bounces=8))
     light = sum(paths[name].mean() for name in ("diffuse_direct", "diffuse_indirect"))
     print(f"{light:.4f}, closed form {expected:.4f}")
-    assert light == pytest.approx(expected, rel=0.04)
+    assert light == pytest.approx(expected, rel=0.06)
