@@ -32,7 +32,7 @@ def test_a_ground_below_water_has_the_light_that_faces_leave_and_mirror_back(sta
     passing = pane_passing(index)[1] / index**2
     radiance = 0.5 * passing / (1 - (1 - passing) * 0.5)
     straight = 1 - ((index - 1) / (index + 1)) ** 2
-    assert seen(stage, 16) == pytest.approx(straight * radiance, rel=0.03)
+    assert seen(stage, 32) == pytest.approx(straight * radiance, rel=0.03)
 
 
 @pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK_SKIN"])
