@@ -64,8 +64,18 @@ LIST = passes.fullscreen_program(
     "list of light that leaves points",
     "subsurface/leaving_list.frag.glsl",
     textures=tuple(
-        ("RGBA32F", name) for name in (*(f"cell_{name}" for name in LEFT), "point_position", "point_normal")
+        ("RGBA32F", name)
+        for name in (
+            *(f"cell_{name}" for name in LEFT),
+            "cells",
+            "point_position",
+            "point_normal",
+            "point_instances",
+            "scatter_objects",
+            "scatter_means",
+        )
     ),
+    constants=(("INT", "first_object"), ("INT", "walks")),
     outputs=(("VEC4", "out_texel"),),
 )
 PROGRAMS = (LEAVING, LIST)
@@ -126,6 +136,7 @@ class LeavingLight:
         hierarchy, settings = frame.hierarchy("shadow"), frame.settings
         owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
         position, normal = points.surface(frame.sample)
+        walks = 1 if settings.schedule.is_draft else max(WALKS // settings.samples, 1)
         if self._sums is None:
             self._sums = images.Target(tuple(images.pool.take(ROW, points.rows, "RGBA32F") for _ in LEFT))
             self._sums.clear()
@@ -140,8 +151,7 @@ class LeavingLight:
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
                 "in_glass": int(coated),
-                "walks": 1 if settings.schedule.is_draft else max(WALKS // settings.samples, 1),
-                "stride": stride_of(self._drawn), "draw_number": self._drawn,
+                "walks": walks, "stride": stride_of(self._drawn), "draw_number": self._drawn,
             },
         )  # fmt: skip
         self._drawn += 1
@@ -151,8 +161,10 @@ class LeavingLight:
             LIST, images.Target((self.image,)), viewport=(0, 1, WIDTH, self._rows),
             textures={
                 **{f"cell_{name}": image for name, image in zip(LEFT, self._sums.colors)}, "point_position": position,
-                "point_normal": normal,
+                "point_normal": normal, "point_instances": points.instances, "scatter_objects": points.table,
+                "scatter_means": textures["scatter_means"], "cells": points.cells[frame.sample % len(points.cells)],
             },
+            constants={"first_object": points.first_object, "walks": walks},
         )  # fmt: skip
         return 2
 

@@ -45,7 +45,7 @@ from ..kernels import diffusion
 from ..lighting import leaving_light, repeated_light, splatted_light, walked_light
 from ..lighting.asked import asked
 from ..lighting.leaving_light import LeavingLight, LeavingService
-from ..lighting.point_light import LIGHTING, PointLight
+from ..lighting.point_light import LIGHTING, LIGHTING_WITH_WAYS, PointLight
 from ..lighting.splatted_light import Splats
 from ..lighting.visibility import RAYS, ray_bindings
 from ..materials import translucency
@@ -129,7 +129,15 @@ COAT = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"),),
     constants=(("FLOAT", "offset_size"), ("INT", "bounces")),
-    outputs=(("VEC4", "out_coat"),),
+    outputs=(("VEC4", "out_coat"), ("VEC4", "out_bent")),
+)
+ENTER = passes.fullscreen_program(
+    "light that enters in glass",
+    "subsurface/enter.frag.glsl",
+    textures=tuple(
+        ("RGBA32F", name) for name in ("cell_direct", "cell_across", "cell_coat", "cell_bent", "point_entry")
+    ),
+    outputs=(("VEC4", "out_direct"),),
 )
 LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
 PROFILES, SPLATS = "PROFILES", "SPLATS"
@@ -207,7 +215,9 @@ class ImageSpaceSubsurface(Technique):
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
         self._shapes: images.Image | None = None  # of cells: normal, depth, mean length of lines through
-        self._coat: images.Image | None = None  # of cells, where anything is glass: by how much more light enters
+        # Of cells, where anything is glass: by how much more light enters, and how by the cosine at which it arrives.
+        self._coat: images.Image | None = None
+        self._bent: images.Image | None = None
         self._coated: set[int] = set()  # materials of what glass may be around
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
@@ -224,7 +234,8 @@ class ImageSpaceSubsurface(Technique):
         form = (
             splatted_light.PROGRAMS if self._splatted(settings, snapshot) else (GATHER, APPLY, *walked_light.PROGRAMS)
         )
-        return CHORD, COAT, LIGHTING, *form, *leaving_light.PROGRAMS
+        in_glass = (COAT, ENTER, LIGHTING_WITH_WAYS)
+        return CHORD, *in_glass, LIGHTING, *form, *leaving_light.PROGRAMS
 
     def _splatted(self, settings: Settings, snapshot: Snapshot) -> bool:
         """Whether light is summed by splats: not for panoramic cameras, whose lines are bent."""
@@ -343,10 +354,10 @@ class ImageSpaceSubsurface(Technique):
         self._coated = {slot for row in rows for slot in placed[row].materials}
         listed = np.zeros((max(len(indices), len(placed)), 4), np.float32)
         listed[: len(indices), 0], listed[rows, 1] = indices, 1.0
-        self._coat = images.pool.take(ROW, self.points.rows, "RGBA32F")
+        self._coat, self._bent = (images.pool.take(ROW, self.points.rows, "RGBA32F") for _ in range(2))
         position, normal = self.points.surface(0)
         passes.fullscreen(
-            COAT, images.Target((self._coat,)),
+            COAT, images.Target((self._coat, self._bent)),
             textures={
                 **frame.hierarchy("shadow").textures, "point_position": position, "point_normal": normal,
                 "point_instances": self.points.instances, "scatter_means": frame.kept(ScatterMeans).image,
@@ -363,23 +374,19 @@ class ImageSpaceSubsurface(Technique):
         direct = self._directly_lit(frame)
         indirect = images.pool.take(*direct.size, "RGBA32F")
         self._light_indirectly(frame, *self.points.surface(frame.sample), indirect)
-        self._enter(indirect)
-        return direct, indirect
-
-    def _enter(self, light: images.Image) -> None:
-        """Light that arrives at points, as it enters through what coats them."""
         if self._coat is not None:
-            target = images.Target((light,))
+            target = images.Target((indirect,))
             passes.fullscreen(passes.COPY, target, blend="MULTIPLY", textures={"original": self._coat})
+        return direct, indirect
 
     def _directly_lit(self, frame: Frame) -> images.Image:
         """Direct light of this sample at the points; `_direct` keeps it until the sample's end."""
         if self._direct is not None and self._direct[0] == frame.sample:
             return self._direct[1]
         size = (ROW, self.points.rows)
-        direct, unused = (images.pool.take(*size, "RGBA32F") for _ in range(2))
+        direct, *others = (images.pool.take(*size, "RGBA32F") for _ in range(2 if self._coat is None else 3))
         position, normal = self.points.surface(frame.sample)
-        target = images.Target((direct, unused))
+        target = images.Target((direct, *others))
         target.clear()
         black = self._constant_images(size)[1]
         tint = self.points.entries(frame.sample)
@@ -387,8 +394,18 @@ class ImageSpaceSubsurface(Technique):
         surfaces |= {"emission": black}
         drawn, rays = self._light.add(frame, surfaces, target, instances=self.points.instances)
         frame.count(self, "passes", drawn)
-        images.pool.give(unused)
-        self._enter(direct)
+        if self._coat is not None:
+            target = images.Target((others[-1],))
+            passes.fullscreen(
+                ENTER, target,
+                textures={
+                    "cell_direct": direct, "cell_across": others[0], "cell_coat": self._coat, "cell_bent": self._bent,
+                    "point_entry": tint,
+                },
+            )  # fmt: skip
+            direct, others[-1] = others[-1], direct
+        for image in others:
+            images.pool.give(image)
         frame.count(self, "rays", rays * ROW * self.points.rows)
         self._direct = frame.sample, direct
         return direct
@@ -495,10 +512,10 @@ class ImageSpaceSubsurface(Technique):
         frame.count(self, "passes", 2)
 
     def _give_shapes(self) -> None:
-        for image in (self._shapes, self._coat):
+        for image in (self._shapes, self._coat, self._bent):
             if image is not None:
                 images.pool.give(image)
-        self._shapes = self._coat = None
+        self._shapes = self._coat = self._bent = None
         self._coated = set()
 
     def _give_whole(self) -> None:

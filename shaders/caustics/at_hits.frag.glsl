@@ -118,7 +118,9 @@ void main()
   vec3 sent;
   vec3 part;
   vec3 same;
-  bool leaves = light_leaves(-1, place.xyz, normal, normal, uint(pixel.x + 4096 * pixel.y), sent, part, same);
+  bool in_glass;
+  uint salt = uint(pixel.x + 4096 * pixel.y);
+  bool leaves = light_leaves(-1, place.xyz, normal, normal, salt, sent, part, same, in_glass);
   vec3 reflected = (leaves ? vec3(1.0) - part : vec3(1.0)) * albedo / PI * irradiance + by_lobe;
   show_light(code, vec4(0.0), vec4(path.rgb * hit_passed_fetch(pixel).rgb * reflected, 0.0));
 }

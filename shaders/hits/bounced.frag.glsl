@@ -35,6 +35,7 @@ vec3 indirect_light(Receiver r, uvec3 roll)
     walk.bounce = 1;
     walk.whole = false;
     walk.gloss = walk.soft = false;
+    walk.in_glass = r.in_glass;
     walk.has_met = false;
     sum += weight * radiance_along(walk, glossy_radius, hash3(roll));
   }

@@ -19,6 +19,7 @@ struct Receiver {
   int mirrored;    // by so many surfaces on the way to the camera
   vec3 passed;     // what the way to the camera leaves of what it sends
   int code;        // of the ray's path
+  bool in_glass;   // light_left counts what glass around mirrors back of what it sends
   Lobe lobe;
 #ifdef TRANSMISSION
   Interface glass;
@@ -49,6 +50,7 @@ bool receiver_at(ivec2 pixel, out Receiver r)
   r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
   r.mirrored = path_mirrors(code);
   bool goes_on = lobe_goes_on(r.surface);
+  r.in_glass = false;
   r.within = mirrors_within(r.surface);
   r.followed = has_lobe && goes_on && ray_number + 1 < rays
                && (r.bends ? ray_number < interfaces : r.mirrored < mirrors);
@@ -69,14 +71,14 @@ uvec3 receiver_roll(ivec2 pixel)
 
 // Light from below the surface, which takes the place of what a diffuse one would send: what is sent, and the colours by
 // which light straight from sources, and that of other surfaces, is reflected.
-vec3 light_left(Receiver r, uint salt, out vec3 straight, out vec3 onward)
+vec3 light_left(inout Receiver r, uint salt, out vec3 straight, out vec3 onward)
 {
   vec3 diffuse = r.surface.diffuse;
   vec3 sent;
   vec3 part;
   vec3 same;
   bool leaves = max_component(diffuse) > 0.0
-                && light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, salt, sent, part, same);
+                && light_leaves(-1, r.surface.position, r.surface.geometric_normal, r.viewer, salt, sent, part, same, r.in_glass);
   straight = leaves ? diffuse * (vec3(1.0) - part) : diffuse;
   onward = leaves ? diffuse * (vec3(1.0) - part * (vec3(1.0) - same)) : diffuse;
   return leaves ? diffuse * part * sent : vec3(0.0);

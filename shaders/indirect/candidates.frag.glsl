@@ -35,6 +35,7 @@ void main()
   vec3 later = vec3(0.0);
   vec3 later_shorter = vec3(0.0);
   vec3 throughput = vec3(1.0);
+  bool in_glass = false;    // of the last surface (Vertex)
   bool mirrored = false;    // the path goes on by a mirror
   bool from_sheet = false;  // by a sheet of glass, from within
   // The first surface and the next ones by the same calls: compilers hold the code of each.
@@ -70,9 +71,10 @@ void main()
         throughput /= chance;
       }
       direction = onward;
+      in_glass = met.in_glass;
       origin = ray_origin(lit_position(met), met.lit);
     }
-    if (!trace_vertex(origin, direction, 1e29, 0.0, roll.z, met, t)) {
+    if (!trace_vertex(origin, direction, 1e29, 0.0, in_glass, roll.z, met, t)) {
 #ifdef GLASS_SHEETS
       later += from_sheet ? throughput * met.passed * wide_sky(direction) : vec3(0.0);
       later_shorter = later;

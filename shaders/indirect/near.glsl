@@ -32,6 +32,7 @@ struct Walk {
   bool whole;   // it brings all light of what it meets, however far that is
   bool gloss;   // it begins at a glossy lobe that takes photons (caustics/gloss.glsl)
   bool soft;    // it begins at a lobe without microfacets that takes them as diffuse surfaces do
+  bool in_glass; // it begins at what is (Vertex)
   bool has_met; // it has met `met` already
   Vertex met;
 };
@@ -59,7 +60,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       float t;
       float limit = walk.whole ? 1e29 : reach;
       float last_mirror = mirror_limit(walk.origin, walk.direction);
-      if (!trace_vertex(walk.origin, walk.direction, limit, last_mirror, roll.z, walk.met, t)) {
+      if (!trace_vertex(walk.origin, walk.direction, limit, last_mirror, walk.in_glass, roll.z, walk.met, t)) {
 #ifdef GLASS_SHEETS
         vec3 passing = walk.met.passed * passing_media(walk.origin, walk.direction, FARTHEST_MEDIUM, roll.y);
         sum += from_sheet ? throughput * passing * wide_sky(walk.direction) : vec3(0.0);
@@ -88,6 +89,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     walk.met.photons = walk.met.photons && (from_seen || from_gloss);
 #endif
     walk.has_met = false;
+    walk.in_glass = walk.met.in_glass;
     walk.whole = mirrored;
     roll = hash3(roll);
     if (share > 0.0) {
@@ -149,6 +151,7 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool gloss, bool sof
   walk.whole = whole;
   walk.gloss = gloss;
   walk.soft = soft;
+  walk.in_glass = false;
   walk.has_met = false;
   return radiance_along(walk, whole ? glossy_radius : near_radius, roll);
 }

@@ -30,6 +30,7 @@ struct Vertex {
   vec3 passed;   // colours of layers before it
   vec3 leaving;  // radiance of direct light that entered elsewhere
   vec3 straight; // of the diffuse albedo, what direct light is reflected by here
+  bool in_glass; // both count what glass around mirrors back of what is sent
 #ifdef HIT_LINKS
   int group;    // of receivers (addon/snapshot/linking.py)
 #endif
@@ -262,8 +263,9 @@ bool mirror_drawn(inout Vertex met, vec3 viewer, float u, bool to_rough)
 #endif
 
 // The surface that a ray meets before `limit`, or the mirror that it meets before `mirror_limit`, if that is farther;
-// false if none.
-bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, uint salt, out Vertex met, out float t)
+// false if none. `in_glass`: of where the ray begins (Vertex); what glass around that mirrors is then none.
+bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, bool in_glass, uint salt, out Vertex met,
+                  out float t)
 {
   ivec2 hit;
 #ifdef SMOOTH_MIRRORS
@@ -282,6 +284,10 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, 
     return false;
   }
 #endif
+  if (in_glass && triangle_is_glass(hit) && !triangle_is_sheet(hit)
+      && dot(triangle_shading_normal(hit, met.position), direction) > 0.0) {
+    return false;
+  }
   met.normal = triangle_normal(hit);
   if (dot(met.normal, direction) > 0.0) {
     met.normal = -met.normal;
@@ -302,7 +308,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, 
   vec3 same;
   met.leaving = vec3(0.0);
   met.straight = vec3(1.0);
-  if (light_leaves(triangle_material(hit), met.position, met.normal, -direction, salt, met.leaving, part, same)) {
+  if (light_leaves(triangle_material(hit), met.position, met.normal, -direction, salt, met.leaving, part, same, met.in_glass)) {
     vec3 onward = vec3(1.0) - part * (vec3(1.0) - same);
     met.leaving *= part * met.reflection.diffuse;
     met.straight = (vec3(1.0) - part) / max(onward, vec3(1e-6));

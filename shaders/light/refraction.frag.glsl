@@ -239,6 +239,7 @@ void main()
       rest.bounce = 0;
       rest.whole = false;
       rest.gloss = rest.soft = false;
+      rest.in_glass = false;
       rest.has_met = true;
       rest.met.position = rest.origin = position;
       rest.met.normal = rest.met.lit = rest.met.turned = geometric_normal;
@@ -248,6 +249,7 @@ void main()
 #endif
       rest.met.leaving = vec3(0.0);
       rest.met.straight = vec3(1.0);
+      rest.met.in_glass = false;
       rest.met.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
       rest.met.reflection.rough = 0.0;
       rest.met.reflection.through = vec3(0.0);

@@ -293,7 +293,8 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       vec3 sent;
       vec3 part;
       vec3 same;
-      bool leaves = light_leaves(triangle_material(hit), position, normal, -way, seed, sent, part, same);
+      bool in_glass;
+      bool leaves = light_leaves(triangle_material(hit), position, normal, -way, seed, sent, part, same, in_glass);
       vec3 straight_on = leaves ? bounced * (vec3(1.0) - part) : bounced;
       if (far) {
         normal = -normal;

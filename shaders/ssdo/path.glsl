@@ -7,10 +7,11 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
 {
   vec3 sum = vec3(0.0);
   vec3 throughput = vec3(1.0);
+  bool in_glass = false;  // of the last surface (Vertex)
   for (int bounce = 0; bounce < bounces; bounce++) {
     Vertex met;
     float t;
-    if (!trace_vertex(origin, direction, 1e29, 0.0, roll.z, met, t)) {
+    if (!trace_vertex(origin, direction, 1e29, 0.0, in_glass, roll.z, met, t)) {
       break;
     }
     throughput *= passing_media(origin, direction, t, roll.y);
@@ -31,6 +32,7 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
     }
     throughput /= stay;
     origin = ray_origin(lit_position(met), met.lit);
+    in_glass = met.in_glass;
   }
   return sum;
 }

@@ -6,8 +6,11 @@
 //
 //   leaves / (1 - F) * sum over bounces k of (albedo back)^k;     of a flat layer leaves = (1 - F) / n2, back = 1 - leaves
 //
-// Of what is mirrored back rays of indirect light bring some, too, from two bounces on: as much as a face mirrors straight on.
-// w: 1 in glass, else 0, and the factor is 1.
+// Bent glass brings light of a lamp elsewhere than a straight ray, some from below the point's horizon. So of light straight from
+// sources, which arrives at the cosine c to the point's normal, enters (a + b c) in place of c; a and b are those with which the
+// directions in which the rays leave have the mean and the mean cosine that they have (out_bent, over the factor above).
+//
+// Rays of indirect light that begin at such points bring none of what their glass mirrors (trace_vertex of indirect/path.glsl). w: 1 in glass, else 0, and the factor is 1.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "trace/rays.glsl"
@@ -36,6 +39,7 @@ void main()
   float within = 0.0;
   float index = 1.0;
   float leaves = 0.0;
+  float ahead = 0.0;  // of that, by the cosine between the direction outside and the normal
   float back = 0.0;
   int instance = int(point_instances_fetch(texel).z + 0.5);
   bool may_be_within = place.w > 0.0 && glass_indices_fetch(ivec2(instance & 2047, instance >> 11)).y > 0.0;
@@ -60,6 +64,7 @@ void main()
       index = n;
       float mirrored = fresnel_dielectric(cosine, 1.0 / n);
       leaves += left * (1.0 - mirrored);
+      ahead += left * (1.0 - mirrored) * max(dot(refract(direction, -normal, n), face), 0.0);
       left *= mirrored;
       direction = safe_normalize(direction - 2.0 * cosine * normal);
       origin = met - ray_offset(met) * normal;
@@ -69,16 +74,21 @@ void main()
     }
   }
   out_coat = vec4(1.0, 1.0, 1.0, 0.0);
+  out_bent = vec4(0.0, 1.0, 0.0, 0.0);
   if (2.0 * within > float(WAYS)) {
     int material = int(point_instances_fetch(texel).w + 0.5);
     vec3 color = scatter_means_fetch(ivec2(material & 15, (material >> 4) + scatter_means_size().y / 3)).rgb;
     float whole = max(leaves + back, 1e-6);
     // Of even light a face from outside (Kulla and Conty 2017).
     float passes = 1.0 - (index - 1.0) / (4.08567 + 1.00071 * index);
-    float straight = (index - 1.0) * (index - 1.0) / ((index + 1.0) * (index + 1.0));
-    float returned = clamp(back / whole - ((bounces > 1) ? straight : 0.0), 0.0, 0.99);
+    float returned = min(back / whole, 0.99);
     vec3 again = clamp(color, vec3(0.0), vec3(1.0)) * returned;
     vec3 times = (vec3(1.0) - pow(again, vec3(float(bounces + 1)))) / (vec3(1.0) - again);
     out_coat = vec4(leaves / (whole * passes) * times, 1.0);
+    // Rays to sources pass a face as half of a pane (pane_passing of materials/energy.py).
+    float face_reflects = fresnel_dielectric(sqrt(0.5), index);
+    float of_lamps = sqrt((1.0 - face_reflects) / (1.0 + face_reflects));
+    float slope = 6.0 * (ahead / max(leaves, 1e-6) - 0.5);
+    out_bent.xy = passes / of_lamps * vec2(0.5 * (1.0 - slope), slope);
   }
 }

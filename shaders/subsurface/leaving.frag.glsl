@@ -1,8 +1,9 @@
 // What light below the surface leaves objects at their points, for whoever sees them but the camera (lighting/leaving_light.py): by
 // walks from each point, entered from directions of the cosine's density. For albedo 1, added over the samples of a picture:
 //
-//   sent  radiance, of the direct light of points, mean over directions; w: walks
-//   slope by how much more the normal's direction gets than the surface's: the line fitted to the walks by the cosine
+//   sent  radiance, of the direct light of points, mean over directions; w: sum of the squares of its luminance over single walks
+//   slope by how much more the normal's direction gets than the surface's: the line fitted to the walks by the cosine; w: above 0
+//         in glass
 //   same  of light that arrives evenly at the side on which the point lies, how much leaves there again; w: samples
 //   red, green, blue  lean along the surface, by how much more the direction towards it gets, of each channel; w: part, the share
 //         of the diffuse albedo that scatters and that walks find; the rest is as a diffuse surface
@@ -67,8 +68,9 @@ void main()
   float part = walks_below ? walked_part(profile_of(PROFILE_WALK, length_m.xyz, color.rgb), object, 0.0, shape.y) : 0.0;
   if (part <= 0.0) {
     // As a diffuse surface, for the light of it that glass around mirrors back.
-    out_sent = coat.w * vec4(min(shape.w, 1.0) * cell_direct_fetch(texel).rgb, 1.0);
+    out_sent.rgb = coat.w * min(shape.w, 1.0) * cell_direct_fetch(texel).rgb;
     out_same = coat.w * vec4(coat.rgb, 1.0);
+    out_slope.w = coat.w;
     vec3 found = coat.w * share.rgb;
     out_red.w = found.r;
     out_green.w = found.g;
@@ -87,6 +89,7 @@ void main()
   vec3 rest = vec3(0.0);
   vec3 by_cosine = vec3(0.0);
   mat3 aslant = mat3(0.0);
+  float squares = 0.0;
   for (int walk = 0; walk < walks; walk++) {
     Even even = even_of(texel, film_view.sample_index * walks + walk, 241);
     uvec2 salt = hash3(even.more).xy;
@@ -99,6 +102,8 @@ void main()
     }
     float cosine = dot(view, entered_normal);
     vec3 brought = sent_so_far - before;
+    float alone = luminance(brought / max(color.rgb, vec3(1e-3))) / float(walks);
+    squares += alone * alone;
     by_cosine += (cosine - 2.0 / 3.0) * brought;
     aslant += outerProduct(view - cosine * entered_normal, brought);
   }
@@ -109,10 +114,10 @@ void main()
   part += rests;
   rests /= part;
   vec3 diffuse = min(shape.w, 1.0) * cell_direct_fetch(texel).rgb;
-  out_sent = vec4(mix(sent_so_far * norm, diffuse, rests), float(walks));
+  out_sent = vec4(mix(sent_so_far * norm, diffuse, rests), squares);
   // One over the variance of the cosine, and of either component along the surface.
   norm *= 1.0 - rests;
-  out_slope = vec4(18.0 * by_cosine * norm, 0.0);
+  out_slope = vec4(18.0 * by_cosine * norm, coat.w);
   vec3 found = part * share.rgb;
   out_red = vec4(4.0 * norm.r * aslant[0], found.r);
   out_green = vec4(4.0 * norm.g * aslant[1], found.g);

@@ -14,11 +14,13 @@ vec4 leaving_texel(int index)
 
 // Light at `position` of a surface that faces along `normal`; material -1: of any. For albedo 1: `sent`, the radiance that leaves
 // towards the viewer of direct light; `part`, the share of the diffuse albedo that this takes the place of; `same`, by how much of its albedo that part
-// sends back light that arrives evenly on this side. False where nothing scatters.
+// sends back light that arrives evenly on this side; `in_glass`: both
+// count all that glass around mirrors back (coat.frag.glsl), so that rays bring none of it. False where nothing scatters.
 bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint salt, out vec3 sent, out vec3 part,
-                  out vec3 same)
+                  out vec3 same, out bool in_glass)
 {
   sent = part = same = vec3(0.0);
+  in_glass = false;
   if (material >= 0 && leaving_texel(1 + (material >> 2))[material & 3] == 0.0) {
     return false;
   }
@@ -45,11 +47,13 @@ bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint
     int index = int(head.z) + int(voxels.w) + 2 * ((at.x * int(voxels.y) + at.y) * int(voxels.z) + at.z) + number / 3;
     int cell = int(leaving_texel(index)[number % 3] + 0.5) - 1;
     if (cell >= 0) {
-      vec3 path = leaving_texel(2048 + 5 * cell + 3).xyz - position;
+      vec4 place = leaving_texel(2048 + 5 * cell + 3);
+      vec3 path = place.xyz - position;
       float away = length(path) / grid.w + 4.0 * abs(dot(path, normal)) / grid.w;
       if (away < least && length(path) < 5.0 * grid.w && (material >= 0 || abs(dot(path, normal)) < grid.w)) {
         least = away;
         chosen = cell;
+        in_glass = place.w > 0.0;
       }
     }
   }

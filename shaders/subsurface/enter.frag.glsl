@@ -1,0 +1,11 @@
+// Light straight from sources as it enters at points in glass, in place of what arrives along straight rays (coat.frag.glsl).
+#include "lib/math.glsl"
+
+void main()
+{
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  vec4 bent = cell_bent_fetch(texel);
+  vec3 even = cell_across_fetch(texel).rgb * point_entry_fetch(texel).rgb / PI;
+  vec3 entering = bent.x * even + bent.y * cell_direct_fetch(texel).rgb;
+  out_direct = vec4(cell_coat_fetch(texel).rgb * max(entering, vec3(0.0)), 0.0);
+}
