@@ -119,9 +119,10 @@ def smooth(frame: Frame, technique: Technique, path: str) -> None:
     frame.count(technique, "filtered samples")
 
 
-def means(frame: Frame, arriving: images.Image, near: images.Target, far: images.Target) -> None:
-    """Means of `arriving` light over 4x4 and 13x13 pixels."""
+def means(frame: Frame, arriving: images.Image, near: images.Target, far: images.Target) -> Iterator[None]:
+    """Means of `arriving` light over 4x4 and 13x13 pixels, in parts, one for each program."""
     _mean(frame, MEAN, arriving, near, 1)
+    yield
     _mean(frame, MEAN_AGAIN, near.colors[0], far, APART)
 
 

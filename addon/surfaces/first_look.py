@@ -89,7 +89,7 @@ FILL = passes.fullscreen_program(
     outputs=(("VEC4", "out_fine"),),
 )
 FILLED = 0.1  # radiance of a white surface that faces the eye, by the exposure, in place of indirect light
-MIRROR = 2.0  # alpha of a guide's colour whose light does not follow its side towards lamps: it has no diffuse closure
+MIRROR = 2.0  # alpha of a guide's colour whose light does not follow its side towards lamps: it has gloss alone
 SOLID = 0.9  # opacity from which on a surface hides what is behind
 FAINT = 0.02  # radiance, by the exposure, that is as good as black where colours are compared
 EVEN, VARIED = 1.0, 0.5  # alpha of glow: its colour is known; only the coarse picture's mean of its surface is
@@ -273,7 +273,7 @@ def _lets_pass(material: CompiledMaterial) -> bool:
 
 def _look_of(material: CompiledMaterial, guides: bool, fills: bool) -> dict[str, tuple[float, ...]]:
     solid = float(guides or not (_lets_pass(material) or material.glass is not None))
-    if guides and not material.diffuse:
+    if guides and material.glossy and not material.diffuse:
         solid = MIRROR
     front, behind = np.zeros((2, 3)) if fills or guides else _radiance_of(material)
     return {

@@ -158,7 +158,7 @@ class History(Technique):
         """Indirect light of neighbours where few pictures stand behind it."""
         light, surfaces = frame.images["history.indirect"], surface_bindings(frame)
         with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
-            neighbours.means(frame, light, near, far)
+            yield from neighbours.means(frame, light, near, far)
             yield
             textures = {
                 "surface_diffuse": surfaces["surface_diffuse"], "fresh_indirect": frame.images[PATHS[1]],
