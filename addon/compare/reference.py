@@ -309,7 +309,8 @@ def render_settings(
 
 
 def cycles_settings(scene: bpy.types.Scene, samples: int, seed: int, bounces: int) -> list[Setting]:
-    """What turns Cycles into an unbiased reference. Names that one Blender version lacks are skipped by the caller."""
+    """What turns Cycles into an unbiased reference. Names that one Blender version lacks are skipped by the caller. The
+    switches of caustics stay the scene's, since Candela follows them."""
     cycles = scene.cycles
     values = {
         "device": "CPU",
@@ -331,8 +332,8 @@ def cycles_settings(scene: bpy.types.Scene, samples: int, seed: int, bounces: in
         "light_sampling_threshold": 0.0,
         "min_light_bounces": 0,
         "min_transparent_bounces": 0,
-        "caustics_reflective": True,
-        "caustics_refractive": True,
+        "caustics_reflective": cycles.caustics_reflective,
+        "caustics_refractive": cycles.caustics_refractive,
         "blur_glossy": 0.0,
         "sample_clamp_direct": 0.0,
         "sample_clamp_indirect": 0.0,

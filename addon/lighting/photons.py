@@ -26,7 +26,7 @@ share out, leave to each: at one sample all of it; points of a light lie so much
 | passes | 2 of the grid's side squared; bytes 10 x 16 per texel |
 
 Bias: footprints blur by about their size, and none of it remains as samples grow. Interfaces behind the first have
-their material's means and no bumps; where light leaves by the face farthest from it, the colour is that of the place.
+their material's means and no bumps; their colour is that of the place as far as opacity_maps.py knows it.
 """
 
 from __future__ import annotations
@@ -75,27 +75,17 @@ EMISSION = Struct(
 )
 
 
-@cache
-def photons_program(patterned: bool) -> Program:
-    """Photons by rays. `patterned`: glass has the colour of the place where they leave it."""
-    behind = ("behind_position", "behind_tint") if patterned else ()
-    return passes.fullscreen_program(
-        "photons",
-        "caustics/photon.frag.glsl",
-        textures=(
-            *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES,
-            *(("RGBA32F", name) for name in ("energy_table", "reflectance", "interface_table", *behind)),
-        ),
-        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
-        constants=(
-            ("FLOAT", "offset_size"), ("INT", "photon_roll"), ("INT", "photon_gloss"), ("INT", "photon_diffuse"),
-        ),
-        defines=(("PATTERNED", ""),) if patterned else (),
-        outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
-    )  # fmt: skip
-
-
-PHOTONS, PATTERNED = photons_program(False), photons_program(True)
+PHOTONS = passes.fullscreen_program(
+    "photons",
+    "caustics/photon.frag.glsl",
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES,
+        *(("RGBA32F", name) for name in ("energy_table", "reflectance", "interface_table")),
+    ),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
+    constants=(("FLOAT", "offset_size"), ("INT", "photon_roll"), ("INT", "photon_gloss"), ("INT", "photon_diffuse")),
+    outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
+)  # fmt: skip
 MAP = (("RGBA32F", "receiver_position"), ("RGBA32F", "receiver_normal"))
 BEHIND = tuple(("RGBA32F", f"behind_{name}") for name in ("position", "normal", "tint", "lobe", "emission"))
 LOOKUPS = passes.fullscreen_program(
@@ -251,7 +241,6 @@ class Photons:
         self._interfaces: images.Image | None = None
         self._emission: Block | None = None
         self._parts = 1
-        self._patterned = False  # whether the colour of some glass differs from place to place
         self._others: list = []  # emissive meshes and the bright world, where they are answered for
         self._found: images.Target | None = None
         self._footprints: images.Target | None = None
@@ -260,7 +249,6 @@ class Photons:
         """Before the first sample of a frame."""
         frame.kept(Reflectance).update(frame)
         self._interfaces = upload_interfaces(frame.materials.compiled, casters.mirrors)
-        self._patterned = any(gloss.patterned(frame.snapshot.materials[k].graph) for k in casters.refracting)
         self._parts = most_interfaces([frame.materials.compiled[k] for k in casters.refracting])
         inner = [frame.materials.compiled[k].medium for k in casters.refracting]
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
@@ -371,18 +359,13 @@ class Photons:
         """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next.
         `on_gloss`: glossy lobes take those that smooth glass lets pass (REFRACTED) and mirrors (REFLECTED), a sum."""
         target = self._target("_found", light.view.side, len(FOUND))
-        patterned = self._patterned and REFRACTED in light.lobes
-        if patterned:
-            behind = self._behind.farthest(frame, technique, light.view, casters.refracting)
         for block, bound in self._drawn(frame, technique, casters, light, interfaces):
             textures = {
                 **frame.hierarchy("transmission").textures, **bound["textures"],
                 "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
             }  # fmt: skip
-            if patterned:
-                textures |= {name: behind[name] for name in ("behind_position", "behind_tint")}
             passes.fullscreen(
-                asked(frame, photons_program(patterned), textures),
+                asked(frame, PHOTONS, textures),
                 target,
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},

@@ -90,6 +90,13 @@ class CompiledMaterial:
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # about what it reflects, on average: for first looks
 
     @property
+    def absorbed_inside(self) -> tuple[float, float, float]:
+        """What solids of it absorb, per metre, where it is glass; zeros where they are clear."""
+        if self.glass is None or self.medium is None:
+            return 0.0, 0.0, 0.0
+        return tuple(np.clip(self.medium.absorption, 0.0, 1e30).tolist())
+
+    @property
     def colors_behind(self) -> bool:
         """Whether layers of it are drawn once more, to colour what lies behind them."""
         some = self.transparent and (self.opacity > 0.0 or self.uneven)

@@ -107,6 +107,16 @@ def pane_passing(ior: float) -> tuple[float, float]:
     return float(np.sqrt((1.0 - face) / (1.0 + face))), float(1.0 - fresnel_dielectric(cosines, ior).mean())
 
 
+def thin_wall_passing(base: np.ndarray, ior: float) -> np.ndarray:
+    """(...) what a thin wall (`shader_thin_wall` of shaders/material/shader.glsl) lets pass of light from all sides, by
+    its base colours `base` (...), 0..1."""
+    cosines = np.sqrt((np.arange(256) + 0.5) / 256)
+    face = fresnel_dielectric(cosines, ior)
+    cosines_inside = np.sqrt(np.maximum(1.0 - (1.0 - cosines**2) / ior**2, 1e-4))
+    absorbed = np.asarray(base, float)[..., None] ** (1.0 / cosines_inside)
+    return ((1.0 - face) ** 2 * absorbed / np.maximum(1.0 - (face * absorbed) ** 2, 1e-6)).mean(axis=-1)
+
+
 def ior_from_f0(f0: float) -> float:
     """Index of refraction whose reflectance at normal incidence is `f0`."""
     root = np.sqrt(min(f0, 0.99))

@@ -48,16 +48,6 @@ def coated(graph: Graph) -> bool:
     return any(value(node, "Coat Weight", 1.0) > 0.0 for node in nodes)
 
 
-def patterned(graph: Graph) -> bool:
-    """Whether the colour of glass is more than a socket's own value."""
-    sockets = [
-        node.inputs.get("Base Color" if node.type == "ShaderNodeBsdfPrincipled" else "Color")
-        for node in graph.nodes.values()
-        if node.type in (*_GLASS, "ShaderNodeBsdfPrincipled")
-    ]
-    return any(socket is not None and socket.link is not None for socket in sockets)
-
-
 def value(node: Node, name: str, unknown: float = 0.0) -> float:
     """A socket's own value, or `unknown` where it is linked or missing."""
     own = _own(node, name)

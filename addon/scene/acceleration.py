@@ -39,7 +39,9 @@ from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
 from .on_gpu import SceneOnGpu
 from .traced_triangles import (
     ALL_RAYS,
+    STAINED,
     TINT_CODE,
+    absorption_records,
     is_empty,
     is_met,
     is_sheet,
@@ -65,6 +67,7 @@ TILED = (("OPACITY_TILES", "1"),)
 OPACITY_TEXEL = 9
 SHEETS = (("GLASS_SHEETS", "1"),)  # where some glass is no closed solid
 TINTED, EMISSION_TEXEL = (("TINTED_LAYERS", "1"),), 10  # where some triangle colours light that passes it
+ABSORBING = (("ABSORBING_LAYERS", "1"),)  # and where the inside of some glass absorbs
 INSTANCED = (("INSTANCED", "1"),)  # and below an upper tree
 NO_TILES = np.zeros((0, 4), np.float32)
 
@@ -162,6 +165,11 @@ def _bounds(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
+def _absorbs(leaves: np.ndarray) -> bool:
+    red, _, blue = np.moveaxis(leaves[:, EMISSION_TEXEL : EMISSION_TEXEL + 3], 1, 0)
+    return bool(((red == STAINED) & (blue != 0.0)).any())
+
+
 def _of_leaves(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Boxes of leaves, of those of their slots."""
     low, high = low.reshape(-1, LEAF, 3), high.reshape(-1, LEAF, 3)
@@ -179,7 +187,8 @@ class Trees:
     """
 
     def __init__(self, world: Tree, tiles: np.ndarray = NO_TILES, copies: Sequence[Copies] = (), origin=(0, 0, 0)):
-        """`tiles`: texels of OpacityMaps that opacity codes tell of; `origin`: what places are relative to."""
+        """`tiles`: texels of OpacityMaps that opacity codes tell of, and records of what absorbs (absorption_records);
+        `origin`: what places are relative to."""
         self.world, self.moved = world, False
         self.asked: tuple[Instance, ...] | None = None  # instances of the last snapshot that was asked for these
         tiles = np.pad(tiles, ((0, -len(tiles) % LEAF_TEXELS), (0, 0)))
@@ -190,6 +199,7 @@ class Trees:
         leaves = images.upload_list(np.concatenate(texels) if len(texels) > 1 else texels[0])
         leaves.defines = (TILED if len(tiles) else ()) + (INSTANCED if len(copies) else ())
         leaves.defines += TINTED if any((tree.leaves[:, EMISSION_TEXEL] <= -TINT_CODE).any() for tree in own) else ()
+        leaves.defines += ABSORBING if any(_absorbs(tree.leaves) for tree in own) else ()
         leaves.defines += SHEETS if any(is_sheet(tree.leaves[:, OPACITY_TEXEL]).any() for tree in own) else ()
         self.upper = UpperTree(copies, np.asarray(origin, float)) if len(copies) else None
         rows = self._joined(copies, starts[1:]) if len(copies) else world.boxes.linked(0, self._first_leaf)
@@ -304,7 +314,7 @@ class HierarchyCache:
         if self._kinds[0] is not snapshot.instances:
             self._kinds = snapshot.instances, {id(i.visibility): i for i in snapshot.instances}
         if self._looks[0] is not materials:  # the same for all paths of a picture
-            self._looks = materials, tuple((mean_code(m), mean_emission(m)) for m in materials)
+            self._looks = materials, tuple((mean_code(m), mean_emission(m), m.absorbed_inside) for m in materials)
         alike = all(is_met(i, path) and rays_met(i, path) == ALL_RAYS for i in self._kinds[1].values())
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if is_met(i, path))
         if passing:
@@ -347,18 +357,20 @@ class HierarchyCache:
             # What opacity and emission tell apart between instances would be too many trees: all have the first one's.
             expanded, kinds = parted(some, meshes, lambda one: (one.mesh, one.materials, *met(one)), LARGEST)
         number = {id(one): k for k, one in enumerate(shown)} if kinds else {}
+        texels, records = absorption_records(materials, maps)
         copies, used = [], {}
         for kind, own in kinds.items():
             first = some[own[0]]
             slots = {*first.materials, 0}  # faces without a material have the first one
-            looks = tuple(self._looks[1][slot] for slot in sorted(slots) if slot < len(self._looks[1]))
+            slots = [slot for slot in sorted(slots) if slot < len(self._looks[1])]
+            looks = tuple((self._looks[1][slot], records.get(slot)) for slot in slots)
             named = (kind, meshes[first.mesh].version, looks, *rest[3:5])
             tree = used[named] = self._meshes.get(named) or _tree_of_mesh(first, look)
             if tree.triangles:
                 own = [some[k] for k in own]
                 copies.append(Copies(tree, own, [number[id(one)] for one in own], *tree.boxes.around(MOST_BOXES)))
         world = Tree(*world_triangles(expanded, meshes, materials, origin, path, maps, glow, sheets))
-        trees = Trees(world, maps.texels, copies, origin)
+        trees = Trees(world, np.concatenate([maps.texels, texels]), copies, origin)
         trees.hierarchy = replace(trees.hierarchy, instances=shown, expanded=tuple(expanded))
         self._meshes = dict([*self._meshes.items()][-MOST_MESHES:]) | used
         return trees

@@ -640,7 +640,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
 
 
 def _opacity_program(compiled: CompiledMaterial) -> Program:
-    """See opacity_maps.py."""
+    """See opacity_maps.py; with a second output where what passes may be coloured."""
     compiled = replace(compiled, own_surface=None)
     like = _caster_program(compiled)
     return replace(
@@ -650,9 +650,9 @@ def _opacity_program(compiled: CompiledMaterial) -> Program:
         fragment="surface/opacity_map.frag.glsl",
         inputs=(*(one for one in like.inputs if one[1] not in ("envelope", "local_instance")), ("VEC2", "cell")),
         varyings=(*like.varyings, ("flat", "INT", "sample_flat")),
-        outputs=(("VEC4", "out_opacity"),),
+        outputs=(("VEC4", "out_opacity"), *([("VEC4", "out_passing")] if compiled.tinted else [])),
         constants=(("INT", "first_instance"), ("VEC2", "tile_scale")),
-        defines=EVERY_DEFINES,
+        defines=(*EVERY_DEFINES, *([("COLORED", "")] if compiled.tinted else [])),
     )
 
 
@@ -665,6 +665,7 @@ def _emission_map_program(compiled: CompiledMaterial) -> Program:
         fragment="surface/emission_map.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
         constants=(("INT", "first_instance"), ("VEC2", "tile_scale"), ("VEC2", "shift"), ("FLOAT", "other_side")),
+        defines=EVERY_DEFINES,
     )
 
 

@@ -18,7 +18,7 @@ from ..materials.energy import pane_passing
 from ..snapshot.scene import LAST_GROUP, Instance, Mesh
 from .emission_maps import EmissionMaps, TriangleEmission
 from .glass_sheets import ALONE, NO_SHEETS, Sheets, open_parts
-from .opacity_maps import OpacityMaps, TriangleOpacity
+from .opacity_maps import OpacityMaps, TriangleOpacity, packed_tints
 
 AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
 # Which rays a triangle stops: all, all but those to lights, those alone, all and those to lights for certain.
@@ -27,6 +27,10 @@ SHEET = WHOLE_SHADOW  # of glass, which stops none for certain: all rays, by the
 MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
 FRONT_ALONE = 0.25  # added to the material's number
 TINT_CODE = 1000.0  # taken from minus the colour of what passes, in the place of what is emitted
+# In the place of red: green names the tile whose colours these are, or is minus a colour (packed_tints); 0: that of the
+# record. Blue names the record of what the inside absorbs, negative where corners run the other way round, 0: nothing.
+STAINED = -2.0 * TINT_CODE
+RECORD = 2  # texels of such a record: what is absorbed, 1/m; mean colour of what passes a face, over the chance to pass
 # Above that number stand the groups of light linking, of receivers and of blockers, those beyond the last one as one:
 # all of it, and the quarter, is exact in one float.
 MATERIAL_BITS, GROUP_BITS = 14, 4
@@ -48,9 +52,10 @@ def world_triangles(
     (T, 3, 3) float32 relative to `origin`, and (T, 8) float32 opacity (_codes), mean emitted radiance, number of the
     material (with the side that emits, mean_emission) and packed corner normals. `sheets`: see
     glass_sheets.py."""
+    absorbing = absorption_records(materials, maps)[1]
     look = {
         (rays, mirrored): np.array([
-            (mean_code(m, rays), *radiance, k + side)
+            (mean_code(m, rays), *(_absorbing(absorbing[k], mirrored) if k in absorbing else radiance), k + side)
             for k, m in enumerate(materials)
             for radiance, side in [mean_emission(m, mirrored)]
         ])
@@ -99,6 +104,21 @@ def world_triangles(
     return corners, looks
 
 
+def absorption_records(materials: list[CompiledMaterial], maps: OpacityMaps) -> tuple[np.ndarray, dict[int, int]]:
+    """Texels (N, 4) that follow those of OpacityMaps, for materials of glass whose inside absorbs; and where the record
+    of each such material begins among all texels."""
+    first = max(len(maps.texels), 1)  # 0 is none
+    own = {k: m for k, m in enumerate(materials) if any(m.absorbed_inside) and not m.emissive}
+    texels = np.zeros((first - len(maps.texels) + RECORD * len(own) if own else 0, 4), np.float32)
+    for row, material in zip(texels[first - len(maps.texels) :].reshape(-1, RECORD, 4), own.values()):
+        row[0, :3], row[1, :3] = material.absorbed_inside, material.tint if material.tinted else 1.0
+    return texels, {k: first + RECORD * number for number, k in enumerate(own)}
+
+
+def _absorbing(record: int, mirrored: bool) -> tuple[float, float, float]:
+    return STAINED, 0.0, -record if mirrored else record
+
+
 def links_code(instance: Instance) -> int:
     """What is added to the material's number for the groups of an instance."""
     links = instance.links
@@ -129,7 +149,7 @@ def _of_glass(material: CompiledMaterial, opacity: np.ndarray | float) -> np.nda
     """(..., 2) opacity of two sides that are alike. Those of glass have the places of opacity for rays from lamps and
     for others, whose light comes from all sides."""
     both = np.stack([np.asarray(opacity, float)] * 2, axis=-1)
-    if material.glass is not None:
+    if material.glass is not None and material.glass.fresnel:
         from_lamps, evenly = pane_passing(material.glass.ior)
         both[..., 1] = 1.0 - (1.0 - both[..., 1]) * evenly / from_lamps
     return both
@@ -177,8 +197,13 @@ def _refine(
         if not whole:
             own = np.flatnonzero(known.measured & (of_triangle == number))
             glass = material.glass is not None
-            sides = _of_glass(material, known.sides[own].mean(axis=-1)) if glass else known.sides[own]
+            even = known.sides[own].mean(axis=-1)
+            sides = np.stack([1.0 - (1.0 - even) * known.to_lamps[own], even], axis=-1) if glass else known.sides[own]
             look[own, 0] = _codes(stopped, sides, mirrored, glass, known.tile[own])
+            if material.tinted and not material.emissive:
+                look[own, 3] = look[own, 3] if any(material.absorbed_inside) else 0.0
+                look[own, 1] = STAINED
+                look[own, 2] = np.where(known.stained[own], known.tile[own], -packed_tints(known.tint[own]))
 
 
 def _let_leave(

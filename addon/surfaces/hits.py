@@ -592,8 +592,8 @@ class Hits:
 
 def absorbed_inside(material: CompiledMaterial) -> tuple[float, float, float]:
     """What solids of a material absorb, per metre, as shaders/trace/solid.glsl asks for it: -1 of clear glass."""
-    absorbed = np.clip(material.medium.absorption, 0.0, 1e30) if material.glass and material.medium else np.zeros(3)
-    return tuple(absorbed) if absorbed.any() else (-1.0 if material.glass else 0.0,) * 3
+    absorbed = material.absorbed_inside
+    return absorbed if any(absorbed) else (-1.0 if material.glass else 0.0,) * 3
 
 
 def defines_of_absorption(per_metre: np.ndarray) -> tuple[tuple[str, str], ...]:

@@ -12,6 +12,7 @@
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
+#include "trace/glass_color.glsl"
 #include "caustics/emission.glsl"
 #include "caustics/arrival.glsl"
 #include "indirect/mirror_color.glsl"
@@ -77,24 +78,6 @@ bool interface_of(int material, vec3 flux, float number, inout vec4 glass, inout
   scale = vec3(shape.y * left / max(chance * part, 1e-30));
   return true;
 }
-
-#ifdef PATTERNED
-// Colour of the glass where a photon leaves it, from what the light's view shows of the casters' last faces; `mean` where it
-// shows another place. `near`: how far apart places of the same texel are, m.
-vec3 color_there(vec3 place, vec3 mean, float share, float near)
-{
-  vec4 p = vec4(place, 1.0);
-  ivec2 size = behind_position_size();
-  float w = dot(film_view.row_w, p);
-  vec2 at = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / max(w, 1e-30) * 0.5 + 0.5) * vec2(size);
-  if (w <= 0.0 || any(lessThan(at, vec2(0.0))) || any(greaterThanEqual(at, vec2(size)))) {
-    return mean;
-  }
-  vec4 there = behind_position_fetch(ivec2(at));
-  bool same = there.w != 0.0 && distance(there.xyz, place) < 4.0 * near;
-  return same ? behind_tint_fetch(ivec2(at)).rgb / max(share, 1e-3) : mean;
-}
-#endif
 
 void main()
 {
@@ -187,11 +170,9 @@ void main()
     vec3 of_interface = vec3(1.0);
     bool is_glass = shape.y > 0.0 && interface_of(material, flux, numbers.x, glass, shape, of_interface);
     bool mirrors = !is_glass && body.w > 0.5;
-#ifdef PATTERNED
-    if (is_glass && leaves && interface_table_size().x == 3) {
-      glass.rgb = color_there(position, glass.rgb, shape.y, width);
+    if (is_glass && interface_table_size().x == 3) {
+      glass.rgb = glass_color(hit, position, glass.rgb, glass.w, shape.y, shape.z > 0.5);
     }
-#endif
 #ifdef ABSORBING
     flux *= exp(-t * solid_absorption(origin, onward, t, hit, leaves, ray_offset(origin), salt + uint(step)));
 #endif

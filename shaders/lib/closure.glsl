@@ -86,6 +86,15 @@ float fresnel_dielectric(float cos_h, float ior)
   return 0.5 * a * a * (1.0 + b * b);
 }
 
+// Mean reflectance of a dielectric over the hemisphere, cosine-weighted: rational fit for ior >= 1 and cubic below.
+float fresnel_average_dielectric(float ior)
+{
+  if (ior >= 1.0) {
+    return (ior - 1.0) / (4.08567 + 1.00071 * ior);
+  }
+  return 0.997118 + ior * (0.1014 - ior * (0.965241 + 0.130607 * ior));
+}
+
 // Of microfacets. All are evaluated with multiple scattering, which the weight of all but the first takes out again.
 #define DISTRIBUTION_GGX 0
 #define DISTRIBUTION_MULTI_GGX 1

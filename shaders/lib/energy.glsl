@@ -165,15 +165,6 @@ vec3 fresnel_reflectance(int fresnel, vec3 tint, vec3 edge, float ior, float cos
   return tint;
 }
 
-// Mean reflectance of a dielectric over the hemisphere, cosine-weighted: rational fit for ior >= 1 and cubic below.
-float fresnel_average_dielectric(float ior)
-{
-  if (ior >= 1.0) {
-    return (ior - 1.0) / (4.08567 + 1.00071 * ior);
-  }
-  return 0.997118 + ior * (0.1014 - ior * (0.965241 + 0.130607 * ior));
-}
-
 // Cosine-weighted mean of fresnel_reflectance over the hemisphere.
 vec3 fresnel_average(int fresnel, vec3 tint, vec3 edge, float ior)
 {

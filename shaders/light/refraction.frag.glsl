@@ -11,6 +11,7 @@
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
+#include "trace/glass_color.glsl"
 #ifdef ABSORBING
 vec3 solid_absorbs(int material)
 {
@@ -272,11 +273,12 @@ void main()
     smooth_normal = leaves ? -smooth_normal : smooth_normal;
     smooth_normal = (dot(smooth_normal, direction) < 0.0) ? smooth_normal : geometric_normal;
     float ior = leaves ? 1.0 / glass.w : glass.w;
+    clear = clear && shape.x <= clear_roughness;
+    glass.rgb = glass_color(hit, position, glass.rgb, glass.w, shape.y, shape.z > 0.5);
     vec3 scale = vec3(1.0);
     if (shape.z > 1.5) {
       scale = glass_multiscatter(glass.rgb, -dot(smooth_normal, direction), shape.x, ior);
     }
-    clear = clear && shape.x <= clear_roughness;
     surface = interface_begin(smooth_normal, -direction, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
                               scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
     roll = hash3(roll);

@@ -8,24 +8,13 @@
 #include "media/media.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
+#include "trace/glass_color.glsl"
 
 #define INTERFACES 10
 // Rays that are mirrored at each of the first two interfaces of glass, at least, but a quarter of all at most.
 #define MIRRORED_RAYS 1000.0
 #define MIRRORED_SHARE 0.25
 #define LEAST_BEAM 1e-3  // of light: where media have taken more, a beam that leaves the scene ends
-
-float dielectric(float cosine, float ior)
-{
-  float g_squared = ior * ior - 1.0 + cosine * cosine;
-  if (g_squared <= 0.0) {
-    return 1.0;
-  }
-  float g = sqrt(g_squared);
-  float a = (g - cosine) / (g + cosine);
-  float b = ((g + cosine) * cosine - 1.0) / ((g - cosine) * cosine + 1.0);
-  return 0.5 * a * a * (1.0 + b * b);
-}
 
 // The part of a stretch that has media around it; false where none has. `even`: these media, as bits, where they are the
 // same along all of it and their number has room in a float; 0: they must be asked for.
@@ -212,7 +201,7 @@ void main()
       }
       float ior = leaves ? 1.0 / glass.w : glass.w;
       float cosine = -dot(smooth_normal, direction);
-      float reflectance = dielectric(cosine, ior);
+      float reflectance = fresnel_dielectric(cosine, ior);
       // At the first two interfaces neighbours take numbers far apart, so that each share of them does what it should.
       vec2 lattice = (i == 0) ? vec2(0.7548777, 0.5698403) : vec2(0.8191725, 0.6710436);
       float turn = fract(dot(floor(gl_FragCoord.xy), lattice) + media_random(choice));
@@ -232,7 +221,7 @@ void main()
         float eta = 1.0 / ior;
         float root = sqrt(max(1.0 - eta * eta * (1.0 - cosine * cosine), 0.0));
         direction = safe_normalize(eta * direction + (eta * cosine - root) * smooth_normal);
-        flux *= glass.rgb / (ior * ior);  // see caustics/photon.frag.glsl
+        flux *= glass_color(hit, position, glass.rgb, glass.w, 1.0, true) / (ior * ior);  // see caustics/photon.frag.glsl
         inside_glass = !leaves;
       }
       position = ray_origin(position, mirrored ? facing : -facing);

@@ -146,18 +146,26 @@ vec2 triangle_place(ivec2 hit, vec3 position)
 }
 
 #ifdef OPACITY_TILES
-// Coverage of a triangle where a ray meets it, from the tile that its code names (addon/scene/opacity_maps.py).
-float tile_opacity(ivec2 hit, float code, bool front, vec3 position)
+// Of the cell where a ray meets a triangle with a tile (addon/scene/opacity_maps.py), among those that begin at `first`.
+float tile_texel(ivec2 hit, vec4 tile, int first, vec3 position)
 {
-  int number = int(code) >> 1;  // of tile and side: corners of an odd one run the other way round
-  vec4 tile = leaf_texel(number >> 1);
   float cells = 2.0 * tile.y;
   vec2 place = triangle_place(hit, position) * cells;
   int x = int(clamp(place.x, 0.0, cells - 1.0));
   int y = int(clamp(place.y, 0.0, cells - 1.0 - float(x)));
-  float both = leaf_texel(int(tile.x) + (y >> 1) * int(tile.y) + (x >> 1))[2 * (y & 1) + (x & 1)];
+  return leaf_texel(first + (y >> 1) * int(tile.y) + (x >> 1))[2 * (y & 1) + (x & 1)];
+}
+
+// Coverage of a triangle where a ray meets it, from the tile that its code names. `to_lamp`: glass lets more pass of light
+// from lamps than of light from all sides.
+float tile_opacity(ivec2 hit, float code, bool front, bool to_lamp, vec3 position)
+{
+  int number = int(code) >> 1;  // of tile and side: corners of an odd one run the other way round
+  vec4 tile = leaf_texel(number >> 1);
+  float both = tile_texel(hit, tile, int(tile.x), position);
   float level = floor(both / 256.0);
-  return ((front == ((number & 1) == 0)) ? level : both - 256.0 * level) / 255.0;
+  float passing = 1.0 - ((front == ((number & 1) == 0)) ? level : both - 256.0 * level) / 255.0;
+  return 1.0 - passing * (to_lamp ? tile.w : 1.0);
 }
 #endif
 
@@ -181,7 +189,7 @@ vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction,
   if (max(max(stopped.x, stopped.y), max(stopped.z, stopped.w)) >= MAPPED) {
     for (int k = 0; k < 4; k++) {
       if (stopped[k] >= MAPPED && t[k] < limit) {
-        opacity[k] = tile_opacity(ivec2(leaf, k), sides[k], facing[k] > 0.0, origin + t[k] * direction);
+        opacity[k] = tile_opacity(ivec2(leaf, k), sides[k], facing[k] > 0.0, shadow, origin + t[k] * direction);
       }
     }
     stopped -= mix(vec4(0.0), vec4(MAPPED), greaterThanEqual(stopped, vec4(MAPPED)));
@@ -276,47 +284,125 @@ uint boxes_met(Boxes b, vec3 origin, vec3 inverse, float reach, out vec4 enter)
 }
 
 // Colours of layers that the last ray of trace_layers has passed: each over the chance that a ray passes it at all. Three are
-// kept apart, of more the farthest are one.
+// kept apart, of more the farthest are one. Faces of what absorbs s per metre are layers, too: a ray keeps exp(-s t) where it
+// leaves a solid after t, over exp(-s t) where it has entered it; what it enters and does not leave absorbs up to its end.
 #ifdef TINTED_LAYERS
 #define LAYERS_KEPT 3
 #define EMISSION_TEXEL 10
 #define TINT_CODE 1000.0  // see addon/scene/traced_triangles.py
+#define STAINED -2000.0    // of red: what green and blue name
 vec4 layers_met[LAYERS_KEPT];  // colour, distance; nearest first
+#ifdef ABSORBING_LAYERS
+vec3 layers_entered[LAYERS_KEPT];  // what absorbs behind it, 1/m, more than before it
+vec3 layers_depth[LAYERS_KEPT];    // the same times the distance
+#endif
+
+// As packed_tints of addon/scene/opacity_maps.py.
+vec3 unpack_tint(float packed_tint)
+{
+  uint bytes = uint(packed_tint);
+  vec3 root = vec3(float(bytes & 255u), float((bytes >> 8u) & 255u), float(bytes >> 16u));
+  vec3 tint = root * root;
+  return 3.0 * tint / max(tint.x + tint.y + tint.z, 1.0);
+}
+
+// Colour of what passes a triangle in one place, over the chance to pass, of what its leaf tells; of those that have no colour
+// of their own the `mean`.
+vec3 told_tint(ivec2 hit, vec3 told, vec3 position, vec3 mean)
+{
+#ifdef OPACITY_TILES
+  if (told.y > 0.0) {
+    vec4 tile = leaf_texel(int(told.y));
+    return unpack_tint(tile_texel(hit, tile, int(tile.z), position));
+  }
+#endif
+  return (told.y < 0.0) ? unpack_tint(-told.y) : mean;
+}
 
 void layers_begin()
 {
   for (int k = 0; k < LAYERS_KEPT; k++) {
     layers_met[k] = vec4(1.0, 1.0, 1.0, 1e30);
+#ifdef ABSORBING_LAYERS
+    layers_entered[k] = vec3(0.0);
+    layers_depth[k] = vec3(0.0);
+#endif
   }
 }
 
-void layers_pass(int leaf, vec4 t, float limit, bvec4 stops, vec4 opacity)
+void layers_pass(int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec4 facing, bvec4 stops, vec4 opacity)
 {
   int base = leaf * LEAF_TEXELS + EMISSION_TEXEL;
   vec4 red = leaf_texel(base);
   for (int i = 0; i < 4; i++) {
     // Of no opacity at all are those that such rays do not meet.
     if (t[i] < limit && !stops[i] && opacity[i] > 0.0 && red[i] <= -TINT_CODE) {
-      vec4 layer = vec4(-vec3(red[i], leaf_texel(base + 1)[i], leaf_texel(base + 2)[i]) - TINT_CODE, t[i]);
+      vec3 told = vec3(red[i], leaf_texel(base + 1)[i], leaf_texel(base + 2)[i]);
+      vec3 color = -told - TINT_CODE;
+#ifdef ABSORBING_LAYERS
+      vec3 entered = vec3(0.0);
+      if (told.x == STAINED && told.z != 0.0) {
+        int record = int(abs(told.z));
+        color = leaf_texel(record + 1).rgb;
+        entered = leaf_texel(record).rgb * (((facing[i] > 0.0) == (told.z > 0.0)) ? 1.0 : -1.0);
+      }
+#endif
+      if (told.x == STAINED) {
+        color = told_tint(ivec2(leaf, i), told, origin + t[i] * direction, color);
+      }
+      vec4 layer = vec4(color, t[i]);
+#ifdef ABSORBING_LAYERS
+      vec3 depth = entered * t[i];
+#endif
       for (int k = 0; k < LAYERS_KEPT; k++) {
         if (layer.w < layers_met[k].w) {
           vec4 farther = layers_met[k];
           layers_met[k] = layer;
           layer = farther;
+#ifdef ABSORBING_LAYERS
+          vec3 behind = layers_entered[k];
+          layers_entered[k] = entered;
+          entered = behind;
+          behind = layers_depth[k];
+          layers_depth[k] = depth;
+          depth = behind;
+#endif
         }
       }
-      layers_met[LAYERS_KEPT - 1].rgb *= (layer.w < 1e29) ? layer.rgb : vec3(1.0);
+      if (layer.w < 1e29) {
+        layers_met[LAYERS_KEPT - 1].rgb *= layer.rgb;
+#ifdef ABSORBING_LAYERS
+        layers_entered[LAYERS_KEPT - 1] += entered;
+        layers_depth[LAYERS_KEPT - 1] += depth;
+#endif
+      }
     }
   }
 }
 
-// Of those nearer than `limit`, together.
+// Of those nearer than `limit`, together. What a ray without an end enters and does not leave absorbs nothing.
 vec3 layers_color(float limit)
 {
   vec3 color = vec3(1.0);
+#ifdef ABSORBING_LAYERS
+  vec3 entered = vec3(0.0);
+  vec3 depth = vec3(0.0);
+  float end = 0.0;
+#endif
   for (int k = 0; k < LAYERS_KEPT; k++) {
-    color *= (layers_met[k].w < limit) ? layers_met[k].rgb : vec3(1.0);
+    if (layers_met[k].w < limit) {
+      color *= layers_met[k].rgb;
+#ifdef ABSORBING_LAYERS
+      entered += layers_entered[k];
+      depth += layers_depth[k];
+      end = layers_met[k].w;
+#endif
+    }
   }
+#ifdef ABSORBING_LAYERS
+  end = (limit < 1e28) ? limit : end;
+  color *= exp(min(depth - max(entered, vec3(0.0)) * end, vec3(0.0)));
+#endif
   return color;
 }
 #else
@@ -345,7 +431,7 @@ void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool
                        to_unit(roll * 277803737u + 7u));
     bvec4 stops = lessThan(chance, opacity);
 #ifdef TINTED_LAYERS
-    layers_pass(leaf, t, nearest, stops, opacity);
+    layers_pass(leaf, t, nearest, origin, direction, facing, stops, opacity);
 #endif
     t = mix(vec4(1e30), t, stops);
     best = min(min(t.x, t.y), min(t.z, t.w));

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.techniques.foggy_stage import box, volume
+from tests.techniques.foggy_stage import box, fill, volume
 
 COLOR = (0.9, 0.3, 0.1)
 
@@ -141,3 +141,94 @@ def test_fog_behind_a_pane_has_its_colour(stage, samples, panes):
     for order, bound in ((0, 0.02), (1, 0.15)):
         share = coloured[1, order] / clear[1, order]
         assert share == pytest.approx(np.array(COLOR) ** panes, rel=bound, abs=0.005)
+
+
+BANDS = np.array([(1.0, 0.05, 0.1), (0.05, 0.8, 1.0)])
+
+
+def banded(stage, kind="ShaderNodeBsdfTransparent", socket="Color", width=1.0, **inputs):
+    """A material whose colour is that of BANDS by turns along x."""
+    made = stage.material(kind, **inputs)
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    place, axes, way, above, mix = (
+        nodes.new(f"ShaderNode{name}") for name in ("NewGeometry", "SeparateXYZ", "Math", "Math", "Mix")
+    )
+    links.new(place.outputs["Position"], axes.inputs[0])
+    way.operation, way.inputs[1].default_value = "PINGPONG", width
+    above.operation, above.inputs[1].default_value = "GREATER_THAN", 0.5 * width
+    mix.data_type = "RGBA"
+    links.new(axes.outputs["X"], way.inputs[0])
+    links.new(way.outputs[0], above.inputs[0])
+    links.new(above.outputs[0], mix.inputs[0])
+    for value, side in zip(BANDS, (6, 7)):
+        mix.inputs[side].default_value = (*value, 1)
+    links.new(mix.outputs[2], nodes[0].inputs[socket])
+    return made
+
+
+def painted(stage):
+    """A material that takes its colour from an attribute of the mesh."""
+    made = stage.material("ShaderNodeBsdfTransparent")
+    node = made.node_tree.nodes.new("ShaderNodeAttribute")
+    node.attribute_name = "Paint"
+    made.node_tree.links.new(node.outputs["Color"], made.node_tree.nodes[0].inputs["Color"])
+    return made
+
+
+def below_a_lit_ceiling(stage, pane=None, thick=0.005):
+    """A floor that has the light of a white ceiling by way of a wide pane of what `pane` makes (one box; or, of painted
+    ones, one of either colour of BANDS beside the other), and no other."""
+    stage.clear()
+    stage.floor(material=stage.diffuse(0.8))
+    made = pane and pane(stage)
+    if pane is painted:
+        for k in range(-18, 18):
+            part = box(stage, made, (0.5 * k, -9, 1.0), (0.5 * k + 0.5, 9, 1.0 + thick))
+            paint = part.data.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER")
+            paint.data.foreach_set("color", np.tile((*BANDS[k % 2], 1), len(paint.data)))
+            part.visible_camera = False
+    elif made:
+        box(stage, made, (-9, -9, 1.0), (9, 9, 1.0 + thick)).visible_camera = False
+    stage.rectangle((-9, -9), (9, 9), 3.0, material=stage.diffuse(0.8)).visible_camera = False
+    stage.light("AREA", (0, 0, 1.6), turn=(np.pi, 0, 0), size=18.0, energy=1000.0).visible_camera = False
+    stage.camera_above(2.0)
+    stage.scene.candela.slot_caustics = "OFF"
+
+
+PATTERNS = {
+    "transparent": banded,
+    "glass": lambda stage: banded(stage, "ShaderNodeBsdfGlass", IOR=1.0, Roughness=0.0),
+    "refraction": lambda stage: banded(stage, "ShaderNodeBsdfRefraction", IOR=1.0, Roughness=0.0),
+    "painted": painted,
+}
+
+
+@pytest.mark.parametrize(("pattern", "samples"), [("transparent", 1), *((pattern, 8) for pattern in PATTERNS)])
+def test_bounced_light_passes_both_faces_of_a_box_in_the_colour_of_the_place(stage, pattern, samples):
+    """The mean of squares, not the square of the mean."""
+    found = []
+    for pane in (None, PATTERNS[pattern]):
+        below_a_lit_ceiling(stage, pane)
+        seeds = range(8 if samples > 1 else 24)  # which layers a ray passes is chance
+        lit = [stage.render(samples, (16, 16), bounces=1, seed=seed)["diffuse_indirect"] for seed in seeds]
+        found.append(np.mean(lit, axis=(0, 1, 2))[:3])
+    assert found[0].min() > 0.01
+    assert found[1] / found[0] == pytest.approx((BANDS**2).mean(axis=0), rel=0.06)
+
+
+def absorbing_glass(stage, per_metre, ior=1.0):
+    made = stage.material("ShaderNodeBsdfGlass", IOR=ior, Roughness=0.0, Color=(1, 1, 1, 1))
+    fill(made.node_tree, "ShaderNodeVolumeAbsorption", Color=(*(1 - np.array(per_metre) / 4), 1), Density=4.0)
+    return made
+
+
+def test_bounced_light_is_absorbed_in_glass_that_it_passes(stage):
+    per_metre, thick, found = (2.0, 0.5, 0.0), 0.4, []
+    for pane in (None, lambda stage: absorbing_glass(stage, per_metre)):
+        below_a_lit_ceiling(stage, pane, thick)
+        found.append(stage.render(16, (16, 16), bounces=1)["diffuse_indirect"][..., :3].mean((0, 1)))
+    # Ways through the slab of even light on the floor below, but for what the ceiling's rim cuts off.
+    cosine = np.sqrt((np.arange(1000) + 0.5) / 1000)
+    cosine = cosine[cosine > np.cos(np.arctan(10.0 / 3.0))]
+    expected = [np.exp(-a * thick / cosine).mean() for a in per_metre]
+    assert found[1] / found[0] == pytest.approx(np.array(expected), rel=0.05)

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..energy import pane_passing
+from ..energy import pane_passing, thin_wall_passing
 from ..estimate import Estimate, Interface, Summary, constant
 from .entry import Approximation, Attribute, Choice, Entry, Expression, Socket
 from .inputs import ROUND, STRAND, WAY
@@ -125,9 +125,12 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
     if transmission.high.any():
         through = alpha * metallic.complement() * transmission
         root = _colored("Base Color")(sockets).map(lambda value: value**0.5)
-        transparency += through * root * _passing(sockets)
         tinted = not root.grey
-        if not (sockets["Thin Wall"].low > THIN).all():
+        if (sockets["Thin Wall"].low > THIN).all():
+            ior = max(float(sockets["IOR"].mean[0]), 1e-5)
+            transparency += through * sockets["Base Color"].clipped().map(lambda base: thin_wall_passing(base, ior))
+        else:
+            transparency += through * root * _passing(sockets)
             glass = _dispersed(sockets, _interface(sockets, root, float(through.mean.mean())))
     emission = alpha * sockets["Emission Strength"]
     # Images are only looked at where they matter.
