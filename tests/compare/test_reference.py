@@ -274,6 +274,14 @@ def test_a_changed_scene_is_rendered_again(room, own_cache, renders, change):
     assert len(renders) == (2 if change is other_filter else 4)  # the filter was changed once only
 
 
+@pytest.mark.parametrize("name", ["caustics_reflective", "caustics_refractive"])
+@pytest.mark.parametrize("on", [True, False])
+def test_a_reference_has_caustics_where_the_scene_has(room, name, on):
+    """Candela follows these switches, too."""
+    setattr(room.cycles, name, on)
+    assert dict(one[1:] for one in reference.cycles_settings(room, 1, 0, 4))[name] == on
+
+
 def test_samples_size_and_bounces_are_part_of_the_key(room):
     layer = room.view_layers[0]
     keys = {
