@@ -140,11 +140,15 @@ class EmissiveTriangles:
         np.fill_diagonal(squared, np.inf)
         return float(np.median(squared.min(axis=1) * density)) * self.power * asked / max(count, 1)
 
+    def reach_of(self, least: float) -> float:
+        """The root, m, of `least` over what the faintest triangle is drawn in proportion to."""
+        luminance = np.abs(self.radiance) @ lights.LUMINANCE
+        return float(np.sqrt(least / (luminance[luminance > 0].min() + self.level)))
+
     def beside(self, least: float) -> tuple[np.ndarray, np.ndarray] | None:
         """The box, low and high, in which a place may be nearer to a point than the root of `least` over what it is
         drawn in proportion to; None where nothing there is lit."""
-        luminance = np.abs(self.radiance) @ lights.LUMINANCE
-        reach = float(np.sqrt(least / (luminance[luminance > 0].min() + self.level)))
+        reach = self.reach_of(least)
         corners, lit = self.corners.reshape(-1, 3), self._receivers
         low, high = corners.min(axis=0) - reach, corners.max(axis=0) + reach
         return (low, high) if ((lit.low <= high) & (low <= lit.high)).all(axis=1).any() else None

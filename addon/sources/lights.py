@@ -33,7 +33,9 @@ LIGHT = Record(
         # Half height, or row; 1 / ((1 - cosine) blend), 0: a hard edge, or of a point on a surface
         # EmissiveTriangles.level, W / (m2 sr).
         ("vec3 v", "float edge"),
-        ("vec3 w", "float least"),  # row; least squared distance at which the point stands for its part of the light
+        # Row; least squared distance at which the point stands for its part of the light, of points on surfaces over
+        # their area.
+        ("vec3 w", "float least"),
     ),
     kinds=("POINT", "SPHERE", "SUN", "RECTANGLE", "ELLIPSE", "DIRECTION", "SURFACE"),
     flags=(
@@ -387,7 +389,7 @@ def surface_row(
     return LIGHT.rows(
         kind=SURFACE, flags=flags if view_count else flags & ~SHADOW_FLAG, first_view=first_view,
         view_count=view_count, centre=point, point=point, rate=1.0, radiance=radiance, area=1.0 / density, axis=normal,
-        least=footprint(1.0 / density, samples),
+        least=footprint(1.0, samples),
     )  # fmt: skip
 
 

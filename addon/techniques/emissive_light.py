@@ -22,6 +22,8 @@ than about five times the way to its neighbours in the picture,
 
 and what this leaves out close by each pixel adds by points of its own: it draws eight for a ray and keeps one by what
 it brings (light/mesh_rays.glsl). Where half of what is lit is as near as the meshes are large, all light comes so.
+These points stand for a part of the mesh each, too, and count as no nearer than that is wide: what they leave out, of a
+tube before its board, a short ray of each pixel finds (light/close_by.frag.glsl).
 
 Emission that varies is measured place by place (scene/emission_maps.py).
 
@@ -38,12 +40,14 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..gfx import images
-from ..lighting import depth_maps
+from ..gfx import images, passes
+from ..lighting import depth_maps, repeated_light
+from ..lighting.asked import asked
 from ..lighting.caustic_casters import meshes_answered
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.light_rates import EmissivePoints
-from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
+from ..lighting.loop import DIRECT_WRITES, OUTPUTS, light_surfaces, lighting
+from ..lighting.repeated_light import Lit
 from ..lighting.visibility import (
     NO_VIEWS,
     RAY_CONSTANTS,
@@ -61,15 +65,17 @@ from ..lighting.visibility import (
 )
 from ..materials.compiler import may_emit, may_reflect
 from ..scene import acceleration
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
-from ..surfaces.draw import LIT_SURFACES
+from ..surfaces.draw import ANY_SURFACE, LIT_SURFACES, SURFACE_TEXTURES
 
 SPREAD = 25.0
 FEWEST_POINTS = 32  # in a whole picture
 MOST_RAYS = 4  # of a pixel in a sample, where it has points of its own, each for several of those
 
 
+OWN_CANDIDATES = 8  # points of which a pixel keeps one
 MESH_RAYS = Lookup(
     "mesh rays",
     "light/mesh_rays.glsl",
@@ -83,10 +89,19 @@ MESH_RAYS = Lookup(
         ("FLOAT", "mesh_light_level"),
         ("FLOAT", "mesh_light_least"),
     ),
-    defines=(("OWN_POINTS", "1"), ("CANDIDATE_POINTS", "8")),
+    defines=(("OWN_POINTS", "1"), ("CANDIDATE_POINTS", str(OWN_CANDIDATES))),
     maps=False,
 )
 LIGHTING = lighting(MESH_RAYS, False)
+CLOSE_BY = passes.fullscreen_program(
+    "emissive surfaces close by",
+    "light/close_by.frag.glsl",
+    textures=(*acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+    constants=(*RAY_CONSTANTS, ("FLOAT", "reach"), ("FLOAT", "drawn_least"), ("FLOAT", "mesh_light_level")),
+    outputs=OUTPUTS,
+    leaves_out=(("links", "of meshes that links leave out pixels draw no points of their own"),),
+)
 
 
 class EmissiveLight(Technique):
@@ -139,12 +154,13 @@ class EmissiveLight(Technique):
         provider = frame.service(VisibilityProvider)
         patches = provider is not None and provider.serves_every_source(frame)
         if self._own is not None:
-            own = self._triangles.row((0.5, 0.5, 0.5), count, flags, 1, 8.0 * frame.settings.samples)
+            own = self._triangles.row((0.5, 0.5, 0.5), count, flags, 1, OWN_CANDIDATES * frame.settings.samples)
             points = [LightPoint(own, self._rays)] * count
             yield from light_surfaces(
                 frame, self, points, 1 << lights.SURFACE, self._sources, lambda *_: self._own_rays(frame)
             )
-            frame.account.count(self, "rays per pixel", count)
+            yield from self._close_by(frame, float(own[lights.LIGHT.at.least]) * self._triangles.power / count)
+            frame.account.count(self, "rays per pixel", count + 1)
             if self._beside is None:
                 return
         points = []
@@ -171,7 +187,7 @@ class EmissiveLight(Technique):
         if self._own is not None:
             spread = self._left_out * count / self._triangles.power
             for point in points:
-                point.row[lights.LIGHT.at.least] = spread * point.row[lights.LIGHT.at.area]
+                point.row[lights.LIGHT.at.least] = spread
         yield from light_surfaces(frame, self, points, 1 << lights.SURFACE, self._sources)
 
     def _choose_own(self, frame: Frame) -> None:
@@ -206,6 +222,17 @@ class EmissiveLight(Technique):
                 "near_low": low, "near_high": high,
             },
         )  # fmt: skip
+
+    def _close_by(self, frame: Frame, least: float) -> Iterator[None]:
+        """Add what points leave out within the root of `least` over what they are drawn in proportion to."""
+        textures, constants = ray_bindings(frame)
+        constants |= {
+            "reach": self._triangles.reach_of(least), "drawn_least": least, "mesh_light_level": self._triangles.level,
+        }  # fmt: skip
+        textures = {"energy_table": frame.materials.energy_table, **textures}
+        program = asked(frame, CLOSE_BY, textures)
+        lit = Lit(program, ANY_SURFACE, {"textures": textures, "blocks": {}, "constants": constants}, [])
+        yield from repeated_light.add(frame, self, self._sources, lit)
 
     def _resolution(self, frame: Frame) -> int:
         return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))

@@ -435,7 +435,7 @@ vec3 emission_close_by(Light light, vec3 origin, vec3 normal, uint salt, out vec
   uvec3 bits = hash3(uvec3(salt, 61u, 7u));
   direction = cosine_direction(normal, vec2(to_unit(bits.x), to_unit(bits.y)));
   float level = light_edge(light);
-  float spread = light_least(light) * emissive_density(light.radiance, level);  // the same of all points
+  float spread = light_least(light) * light.area * emissive_density(light.radiance, level);  // the same of all points
   float reach = sqrt(spread / max(level, 1e-30));
   ivec2 hit;
   float t = trace_nearest(origin, direction, reach, bits.z, hit);

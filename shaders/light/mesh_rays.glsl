@@ -50,7 +50,6 @@ Light own_point(Light light, int number)
   float roll = to_unit(hash3(uvec3(salt.z, uint(film_view.sample_index), uint(number))).x);
   float total = 0.0;
   float chosen = 0.0;
-  float bright = 1.0;
   float missing = 1.0;
   for (int k = 0; k < CANDIDATE_POINTS; k++) {
     float x = (float(number) + (float(k) + first) / float(CANDIDATE_POINTS)) / float(light_count);
@@ -65,13 +64,15 @@ Light own_point(Light light, int number)
     vec3 facing = other.w * safe_normalize(cross(edge.xyz, other.xyz));
     vec3 radiance = mesh_light(triangle, 3).rgb;
     vec3 way = point - position;
-    float squared = max(dot(way, way), light_least(light));
+    float shining = luminance(abs(radiance));
+    float often = emissive_density(radiance, mesh_light_level);
+    // What is drawn more often stands for less of the light, and may be nearer.
+    float area = mesh_light_power / max(often * float(light_count), 1e-30);
+    float squared = max(dot(way, way), light_least(light) * area);
     vec3 direction = safe_normalize(way);
     float cos_light = -dot(direction, facing);
     cos_light = (edge.w > 0.5) ? max(cos_light, 0.0) : abs(cos_light);
     // What is drawn more often counts the less: in proportion to luminance and, as often, to area.
-    float shining = luminance(abs(radiance));
-    float often = emissive_density(radiance, mesh_light_level);
     float left_out = 1.0;
     if (mesh_light_least > 0.0) {
       left_out = 1.0 - min(squared * often / mesh_light_least, 1.0);
@@ -84,7 +85,7 @@ Light own_point(Light light, int number)
     roll = clamp(taken ? roll / chance : (roll - chance) / max(1.0 - chance, 1e-6), 0.0, 1.0);
     if (taken) {
       chosen = share;
-      bright = often;
+      light.area = area;
       missing = left_out;
       light.point = light.centre = point;
       light.axis = facing;
@@ -92,8 +93,7 @@ Light own_point(Light light, int number)
       light.flags = (edge.w > 0.5) ? (light.flags | LIGHT_SIDED) : (light.flags & ~LIGHT_SIDED);
     }
   }
-  // The density by which lobes share their light with points is that of a point alone: both sides know it.
-  light.area = mesh_light_power / max(bright * float(light_count), 1e-30);
+  // light.area: the density by which lobes share their light with points is that of a point alone. Both sides know it.
   light.radiance *= missing * total / max(float(CANDIDATE_POINTS) * chosen, 1e-30);
   return light;
 }

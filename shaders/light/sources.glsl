@@ -128,7 +128,8 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       return vec3(0.0);
     }
     density = squared / max(light.area * cos_light, 1e-30);  // lobes know it, however near the light is
-    float solid_angle = light.area * cos_light / max(squared, light_least(light));
+    float least = light_least(light) * (LIGHT_IS(light, LIGHT_SURFACE) ? light.area : 1.0);
+    float solid_angle = light.area * cos_light / max(squared, least);
     vec3 radiance = light.radiance * light_tree(light, -direction, light.point, path);
     return radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
   }

@@ -307,6 +307,20 @@ def ball_mesh(inwards=False):
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("samples", [1, 8])
+def test_a_panel_lights_what_it_nearly_touches_beside_a_stronger_one(floor, samples):
+    """The stronger one, below the floor, takes nearly all points; those left stand for parts of the panel that are
+    wider than its distance (.12 and .31 of the light before)."""
+    panel(floor, z=0.02)
+    floor.glow = floor.material("ShaderNodeEmission", Strength=100 * RADIANCE, Color=(1, 1, 1, 1))
+    panel(floor, z=-5.0)
+    source = model.area((0, 0, 0.02), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    expected = model.irradiance(source, receivers(1))
+    found = irradiance(floor, samples)
+    assert "of each pixel's own" in str(floor.ledger.row("emissive_light").choices)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.03)
+
+
 def test_a_faint_lamp_near_by_is_found_beside_a_strong_one_far_away(floor):
     """It has a thousandth of the power and most of the light: points drawn by power alone miss it in most pictures."""
     panel(floor, z=1.0, half=0.1).visible_shadow = False

@@ -1,0 +1,38 @@
+// Light of emissive triangles so close that points on them leave it out: a point at distance d counts min(1, d2 / least) of
+// its light (light_sample), and least is `drawn_least` over what points are drawn in proportion to. A cosine-distributed ray
+// of each pixel meets such triangles: one at distance d counts the rest.
+#include "ask/view.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "lib/brdf.glsl"
+#include "trace/rays.glsl"
+#include "ask/media.glsl"
+
+void main()
+{
+  out_diffuse = vec4(0.0);
+  out_glossy = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  if (surface_position_fetch(pixel).w == 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(pixel);
+  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 37u));
+  vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
+  vec3 direction = cosine_direction(s.normal, u);
+  if (!(max_component(s.diffuse) > 0.0) || dot(direction, s.geometric_normal) <= 0.0) {
+    return;
+  }
+  vec3 origin = ray_origin(s.position, s.geometric_normal);
+  ivec2 hit;
+  float t = trace_nearest(origin, direction, reach, salt.z + uint(film_view.sample_index), hit);
+  if (t >= reach) {
+    return;
+  }
+  vec3 ignored;
+  vec3 emission = triangle_emission(hit, direction, ignored);
+  float missing = max(1.0 - t * t * emissive_density(emission, mesh_light_level) / drawn_least, 0.0);
+  vec3 passing = layers_color(t) * media_transmittance(origin, direction, t, salt.x);
+  vec3 reflected = surface_diffuse_reflection(s, TO_VIEWER(s), direction) * (PI / max(dot(direction, s.normal), 1e-6));
+  out_diffuse.rgb = emission * passing * reflected * missing;
+}
