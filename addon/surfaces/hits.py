@@ -221,13 +221,14 @@ def _fill(count: int) -> str:
     return '#include "hits/attributes.glsl"\n' + head + "\n".join(lines) + "\n}\n"
 
 
-@dataclass(frozen=True)
+@dataclass
 class Records:
     """What rays of a round met: RECORDS, the number of the material, and that as depth."""
 
     target: images.Target
     # By material, in rows of ROW: 1 if any ray has met it; in the second half, if any has met one of its program.
     met: images.Image
+    all_met: bool = False  # whether `met` holds 1 for all materials
 
     @classmethod
     def take(cls, size: tuple[int, int]) -> Records:
@@ -439,8 +440,9 @@ class Hits:
                 if len({frame.materials.leaders[k] for k in possible}) > MOST_UNFLAGGED:
                     self._flag_met(frame, records)
                 else:
-                    records.met.texture.clear(format="UINT", value=(1,))
-                    self._flagged = False
+                    if not records.all_met:
+                        records.met.texture.clear(format="UINT", value=(1,))
+                    records.all_met, self._flagged = True, False
                 return possible
         self._flag_met(frame, records)
         # Beyond the scene's materials the image holds what others left there, where a driver clears late.
@@ -448,7 +450,7 @@ class Hits:
 
     def _flag_met(self, frame: Frame, records: Records) -> None:
         """Write flags of the materials of these records."""
-        self._flagged = True
+        self._flagged, records.all_met = True, False
         records.met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
         textures |= {"rays": self._rays, "hit_materials": self._absorption_of(frame)}

@@ -84,6 +84,21 @@ def test_each_mirror_takes_its_share(stage, bounces, share):
     assert reflected(images).mean() == pytest.approx(share, abs=1e-4)
 
 
+def test_bounces_that_no_ray_has_left_cost_nothing(stage):
+    """Rays of a mirror end at a ceiling, however many bounces they may have."""
+    stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
+    ceiling(stage, stage.diffuse(0.5), half=30.0)
+    stage.rectangle(
+        (-0.1, -0.1), (0.1, 0.1), material=stage.principled(Metallic=1.0, Roughness=0.2), location=(0, 0, -5)
+    )
+    stage.camera_above()
+    passes, found = [], []
+    for bounces in (2, 8):
+        found.append(stage.render(2, SIZE, bounces=bounces)["glossy_indirect"])
+        passes.append(stage.ledger.row("shaded_reflections").counters["passes"])
+    assert passes[0] == passes[1] and np.array_equal(*found)
+
+
 def test_what_no_ray_meets_costs_nothing(stage):
     stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
     hidden = stage.rectangle((-1, -1), (1, 1), material=stage.diffuse(0.3), location=(0, 0, -5))
