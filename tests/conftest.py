@@ -89,7 +89,7 @@ def few_programs():
     yield
     library = sys.modules.get("addon.gfx.library")
     if library is not None:
-        library.free_lasting(library.MOST_PROGRAMS)
+        library.free_lasting(library.most_programs())
 
 
 @pytest.fixture(autouse=True)

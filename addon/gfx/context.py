@@ -141,6 +141,11 @@ def rasterises_in_software() -> bool:
     return "llvmpipe" in gpu.platform.renderer_get()
 
 
+def is_lavapipe() -> bool:
+    """Whether the driver is Mesa's Vulkan in software."""
+    return gpu.platform.backend_type_get() == "VULKAN" and rasterises_in_software()
+
+
 def overtakes_draws() -> bool:
     """Whether a dispatch may run before draws that were asked for earlier: llvmpipe (seen with Mesa 22.3) starts it at
     once, while its rasteriser still works on them."""

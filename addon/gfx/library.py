@@ -278,6 +278,7 @@ def _leave(_name: str, _value) -> None:
 
 
 MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120
+MOST_IN_LAVAPIPE = 64  # Mesa's Vulkan in software holds each in 10 to 30 MB of this process; llvmpipe in 6
 
 _shaders: dict[Program, Shader] = {}
 # Handles of shaders that are no more. Python may collect garbage in any thread, and Blender 4.5 ends with a
@@ -335,11 +336,17 @@ def kept() -> int:
     return len(_shaders)
 
 
+def most_programs() -> int:
+    """How many programs are kept for later by this driver."""
+    lavapipe = context.available() and context.is_lavapipe()
+    return min(MOST_PROGRAMS, MOST_IN_LAVAPIPE) if lavapipe else MOST_PROGRAMS
+
+
 @on_picture
 def _free_old() -> None:
-    """Of more than MOST_PROGRAMS free those that were asked for the longest ago, but none that a recent picture used:
+    """Of more than `most_programs` free those that were asked for the longest ago, but none that a recent picture used:
     a scene of very many materials keeps them all."""
-    surplus = len(_shaders) - MOST_PROGRAMS
+    surplus = len(_shaders) - most_programs()
     if surplus > 0:
         old = [program for program, shader in _shaders.items() if shader.used < context.pictures - context.RECENT]
         for program in sorted(old, key=lambda one: _shaders[one].used)[:surplus]:

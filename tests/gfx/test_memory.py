@@ -36,6 +36,17 @@ def test_programs_that_no_recent_picture_used_make_room(few_programs):
     assert library.compile_count == compiled + 1, "the oldest one had gone"
 
 
+@pytest.mark.parametrize(("lavapipe", "kept"), [(True, 4 + context.RECENT), (False, 20)])
+def test_a_driver_that_holds_programs_in_much_memory_keeps_fewer(few_programs, monkeypatch, lavapipe, kept):
+    monkeypatch.setattr(context, "is_lavapipe", lambda: lavapipe)
+    monkeypatch.setattr(library, "MOST_PROGRAMS", 20)
+    monkeypatch.setattr(library, "MOST_IN_LAVAPIPE", 4)
+    for number in range(20):
+        context.begin_picture()
+        library.get(program(number))
+    assert library.kept() <= kept and (lavapipe or library.kept() == kept)
+
+
 def test_a_picture_of_many_programs_keeps_them_all(few_programs):
     for _ in range(2 * context.RECENT):
         context.begin_picture()
