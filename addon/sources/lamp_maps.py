@@ -114,6 +114,11 @@ class LampMaps:
         """Whether places on the lamp shine differently."""
         return light.key in self._factors and self._factors[light.key][1].places is not None
 
+    def varies_by_place_alone(self, light: Light) -> bool:
+        """Whether the lamp as a whole, at its mean, lights what is diffuse as its places together do."""
+        one = self._factors[light.key][1] if light.key in self._factors else LampFactors(np.ones(3))
+        return one.directions is None and one.paths is None
+
     @property
     def notes(self) -> tuple[Note, ...]:
         """What of lamps is drawn otherwise than Cycles would."""

@@ -228,7 +228,10 @@ def _stands_for(frame: Frame, emitter: lights.Emitter, provider, number: int, po
     for; and whether it does so in closed form (WHOLE_FLAG)."""
     part = provider.part(frame, emitter, number, points)
     cell = 1.0 if part else provider.cell(frame, number, points)
-    return part, cell, cell >= 1.0 and emitter.extended and emitter.maps is None
+    # One point of a textured lamp would give the whole picture the brightness of its place.
+    all_of_it = part is None or part.area >= emitter.area
+    even = emitter.maps is None or (all_of_it and frame.lamp_maps.varies_by_place_alone(emitter.light))
+    return part, cell, cell >= 1.0 and emitter.extended and even
 
 
 def _is_near(frame: Frame, emitter: lights.Emitter) -> bool:

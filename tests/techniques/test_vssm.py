@@ -275,3 +275,20 @@ def test_a_light_without_extent_casts_hard_shadows(floor, technique):
     ).reshape(4, 64)
     assert set(np.round(share, 3).ravel()) == {0.0, 1.0}
     assert floor.ledger.row(technique).counters["hard lights"] == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_sample_of_a_textured_lamp_has_the_light_of_all_its_places(floor, seed):
+    """A checker of places half as bright as their neighbours: its mean, whichever is drawn (.66 or 1.33 before)."""
+    lamp = floor.light("AREA", (0, 0, 2), energy=10.0, size=1.0)
+    lamp.data.use_nodes = True
+    tree = lamp.data.node_tree
+    place, checker = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeTexChecker")
+    for name, value in {"Scale": 2.0, "Color1": (1, 1, 1, 1), "Color2": (0.5, 0.5, 0.5, 1)}.items():
+        checker.inputs[name].default_value = value
+    tree.links.new(place.outputs["Parametric"], checker.inputs["Vector"])
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(checker.outputs["Color"], emission.inputs["Color"])
+    source = model.area((0, 0, 2), (1, 0, 0), (0, 1, 0), 7.5)
+    found = irradiance(floor, 1, (16, 16), seed)
+    assert found.mean() == pytest.approx(model.irradiance(source, receivers((16, 16))).mean(), rel=0.02)
