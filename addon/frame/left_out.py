@@ -67,7 +67,7 @@ def _thrown_wide(
     """Gloss that is narrower than the lobes of paths and no caustic: what it throws onto surfaces is blurred."""
     if plan.filled.get("indirect") in (None, DIRECTED) or settings.bounces <= 0:
         return
-    least = gloss.SMOOTH if "caustics" in plan.filled else 0.0
+    least = gloss.THROWS if "caustics" in plan.filled else 0.0
     names = []
     for number in sorted(snapshot.used_materials):
         graph = snapshot.materials[number].graph
@@ -79,7 +79,7 @@ def _thrown_wide(
         evenly = plan.filled["indirect"] in EVEN
         spread = "evenly, as by dull surfaces" if evenly else "as by a roughness of 0.5"
         text = f"light that other surfaces get from the gloss of {told} is spread {spread}: lamps' reflections there"
-        yield Note("Gloss", f"{text} are softer. Metals of roughness 0.25 or less throw caustics.")
+        yield Note("Gloss", f"{text} are softer. Metals of roughness 0.5 or less throw caustics.")
 
 
 def _flat_fibres(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:

@@ -1,14 +1,14 @@
 """Casters of caustics: the materials, objects and lights that techniques of the slot `caustics` take over.
 
 A material is a caster if it bends light (glass, of any roughness) or mirrors it with no diffuse part to speak of and is
-smooth (materials/gloss.py): roughness up to gloss.SMOOTH, known from the socket's own value. What a varnish over a
-diffuse surface mirrors stays with indirect light.
+no rougher than gloss.THROWS (materials/gloss.py), by the socket's own value. What a varnish over a diffuse surface
+mirrors stays with indirect light.
 
 A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. So are emissive meshes,
 and, where there is glass, the bright part of the world (sources/bright_world.py): the rest of it is wide light, which
 clear glass leaves as it is. Shadow rays of what is answered for take glass as opaque: what passes it arrives as
 photons of it. All glass counts there, so a pane beside a lens is a caster, too. A scene in which all glass is flat
-panes and nothing else throws caustics is left to straight light, as is right for panes.
+panes and no metal is smooth is left to straight light, as is right for panes.
 
 Of lamps that light linking keeps from all casters nothing is bent or mirrored.
 
@@ -52,7 +52,7 @@ _CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHol
 
 def mirror_roughness(graph: Graph) -> float | None:
     """Roughness of a material that mirrors photons; None if it does not."""
-    return min((rough for rough in gloss.mirrors(graph) if rough <= gloss.SMOOTH), default=None)
+    return min((rough for rough in gloss.mirrors(graph) if rough <= gloss.THROWS), default=None)
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,11 @@ class Casters:
     @property
     def materials(self) -> frozenset[int]:
         return self.refracting | frozenset(self.mirrors)
+
+    @property
+    def going_on(self) -> dict[int, float]:
+        """Roughness of the mirrors from which photons go on that come from others."""
+        return {number: rough for number, rough in self.mirrors.items() if rough <= gloss.SMOOTH}
 
     def wanted(self, key: str) -> int:
         """REFRACTED and REFLECTED, a sum, of what diffuse surfaces are to have of a light."""
@@ -105,11 +110,9 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
         shown = [one for one in shown if one.caustics_caster or not set(mirrors).isdisjoint(one.materials)]
     if not shown:
         return "no object that throws caustics is visible to light from surfaces"
-    if (
-        film.caustics_refractive
-        and not mirrors
-        and all(_is_pane(snapshot.meshes[mesh]) for mesh in {one.mesh for one in shown})
-    ):
+    smooth = any(rough <= gloss.SMOOTH for rough in mirrors.values())
+    of_glass = {one.mesh for one in shown if not glass.isdisjoint(one.materials)}
+    if film.caustics_refractive and of_glass and not smooth and all(_is_pane(snapshot.meshes[k]) for k in of_glass):
         return "all glass is flat panes, which light passes straight"
     lamps = (light for light in snapshot.lights if light.cast_shadow and light.visibility.diffuse)
     given = [light for light in lamps if np.any(light.strength)]

@@ -46,7 +46,7 @@ REFLECT_APART = replace(
     REFLECT,
     name="what points reflect, gloss apart",
     textures=(*REFLECT.textures, ("R32F", "hit_material"), ("R32F", "thrown_materials")),
-    defines=(*REFLECT.defines, ("GLOSS", "1"), ("SMOOTH_MIRROR", f"{gloss.SMOOTH + 1e-4:.4f}")),
+    defines=(*REFLECT.defines, ("GLOSS", "1"), ("SMOOTH_MIRROR", f"{gloss.THROWS + 1e-4:.4f}")),
     outputs=tuple(("VEC4", f"out_{name}") for name in (*NAMES, "albedo", "gloss")),
 )
 PROGRAMS = (REFLECT, LIGHTING)

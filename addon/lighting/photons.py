@@ -248,7 +248,7 @@ class Photons:
     def begin(self, frame: Frame, casters: caustic_casters.Casters) -> None:
         """Before the first sample of a frame."""
         frame.kept(Reflectance).update(frame)
-        self._interfaces = upload_interfaces(frame.materials.compiled, casters.mirrors)
+        self._interfaces = upload_interfaces(frame.materials.compiled, casters.going_on)
         self._parts = most_interfaces([frame.materials.compiled[k] for k in casters.refracting])
         inner = [frame.materials.compiled[k].medium for k in casters.refracting]
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
@@ -425,7 +425,7 @@ class Photons:
         )  # fmt: skip
         for lobe, block, surfaces in drawn:
             values = {
-                "box_low": (*view.low, 0.0), "box_high": (*view.high, gloss.SMOOTH),
+                "box_low": (*view.low, 0.0), "box_high": (*view.high, gloss.THROWS),
                 "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), strata),
                 "absorbed": (*self._absorbed, 0.0), "passing": tuple(passing), "mirroring": float(mirroring),
                 "interfaces": interfaces, "bends": int(lobe == REFRACTED),

@@ -40,7 +40,7 @@ REFLECTANCE = passes.fullscreen_program(
     "indirect/reflectance.frag.glsl",
     textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     constants=(("IVEC2", "extent"), ("INT", "rows"), ("FLOAT", "view_cosine"), ("INT", "mirrors")),
-    defines=(("SMOOTH_MIRROR", f"{gloss.SMOOTH + 1e-4:.4f}"),),
+    defines=tuple((name, f"{most + 1e-4:.4f}") for name, most in (("THROWS", gloss.THROWS), ("SMOOTH", gloss.SMOOTH))),
     outputs=(("VEC4", "out_reflectance"),),
 )
 # For programs that read the image where a technique brings what mirrors and glass throw on diffuse surfaces.
@@ -100,7 +100,7 @@ class Reflectance:
         cells = [(k % COLUMNS, band * rows + k // COLUMNS, 1, 1) for k in changed for band in range(BANDS)]
         for viewport in cells if few else [(0, 0, COLUMNS, BANDS * rows)]:
             self._average(frame, seen, viewport, rows, mirrors=0)
-        for k in filter(lambda k: _throws_caustics(frame, k), changed):
+        for k in filter(lambda k: _goes_on(frame, k, gloss.THROWS), changed):
             for band in (0, 1):  # those whose fourth number is about mirrors
                 self._average(frame, seen, (k % COLUMNS, band * rows + k // COLUMNS, 1, 1), rows, mirrors=1)
         for image in seen:
@@ -136,14 +136,15 @@ class Reflectance:
         self.image, self._keys, self._sky = None, {}, ()
 
 
-def _throws_caustics(frame: Frame, material: int) -> bool:
-    """As lighting/caustic_casters.py has it: polish over another surface does not, however dark that is."""
-    return smooth_metal(frame, material) or frame.materials.compiled[material].glass is not None
+def _goes_on(frame: Frame, material: int, most: float = gloss.SMOOTH) -> bool:
+    """Whether it is glass, or metal up to a roughness of `most`. With gloss.THROWS: whether it throws caustics as
+    lighting/caustic_casters.py has it: polish over another surface does not, however dark that is."""
+    return smooth_metal(frame, material, most) or frame.materials.compiled[material].glass is not None
 
 
 def _mirrors_box(frame: Frame) -> np.ndarray:
-    """(2, 3) corners of a box around all objects of `_throws_caustics`, with a margin for those that are flat."""
-    own = {k for k in frame.snapshot.used_materials if _throws_caustics(frame, k)}
+    """(2, 3) corners of a box around all objects of `_goes_on`, with a margin for those that are flat."""
+    own = {k for k in frame.snapshot.used_materials if _goes_on(frame, k)}
     boxes = []
     for one in frame.snapshot.instances if own else ():
         mesh = frame.snapshot.meshes[one.mesh]
@@ -158,8 +159,8 @@ def _mirrors_box(frame: Frame) -> np.ndarray:
     return np.stack([low - margin, high + margin]) - frame.geometry.origin
 
 
-def smooth_metal(frame: Frame, material: int) -> bool:
-    return min(gloss.mirrors(frame.snapshot.materials[material].graph), default=1.0) <= gloss.SMOOTH
+def smooth_metal(frame: Frame, material: int, most: float = gloss.SMOOTH) -> bool:
+    return min(gloss.mirrors(frame.snapshot.materials[material].graph), default=1.0) <= most
 
 
 def keys_of(frame: Frame) -> dict[int, object]:

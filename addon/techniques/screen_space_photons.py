@@ -197,7 +197,7 @@ def _on_gloss(snapshot: Snapshot, casters: caustic_casters.Casters | str) -> boo
     glass, even where those have a rough lobe, too."""
     if isinstance(casters, str) or not casters.refracting:
         return False
-    rough = [*(max(gloss.mirrors(snapshot.materials[k].graph)) for k in casters.mirrors)]
+    rough = [*(max(gloss.mirrors(snapshot.materials[k].graph)) for k in casters.going_on)]
     rough += [max(gloss.glass(snapshot.materials[k].graph), default=1.0) for k in casters.refracting]
     return may_be_glossy(snapshot) and max(rough) <= gloss.SMOOTH
 

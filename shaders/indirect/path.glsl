@@ -156,7 +156,8 @@ bool may_be_mirror(ivec2 hit, vec3 position, vec3 direction)
   int rows = reflectance_size().y / REFLECTANCE_BANDS;
   bool metal = reflectance_fetch(place).a > 0.5;
   for (bool unsure = metal; unsure; unsure = false) {
-    metal = max_component(reflectance_fetch(place + ivec2(0, 3 * rows)).rgb) > 0.0;
+    metal = reflectance_fetch(place + ivec2(0, rows)).a >= 0.0
+            && max_component(reflectance_fetch(place + ivec2(0, 3 * rows)).rgb) > 0.0;
   }
 #ifdef GLASS_SHEETS
   return metal || leaves_sheet(hit, position, direction);
