@@ -92,8 +92,14 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
     walk.in_glass = walk.met.in_glass;
     walk.whole = mirrored;
     roll = hash3(roll);
-    if (share > 0.0) {
-      sum += throughput * share * direct_reflected(walk.met, -walk.direction, 1, roll.x);
+    float direct_share = share;
+#ifdef MIRRORS_OWNED
+    // Virtual lights send nothing of what metal mirrors of lights that photons answer for.
+    walk.met.others = mirrored ? share : 1.0;
+    direct_share = mirrored ? 1.0 : share;
+#endif
+    if (direct_share > 0.0) {
+      sum += throughput * direct_share * direct_reflected(walk.met, -walk.direction, 1, roll.x);
     }
 #ifdef SMOOTH_MIRRORS
     if (mirrored) {

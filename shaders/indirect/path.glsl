@@ -36,6 +36,7 @@ struct Vertex {
 #endif
 #ifdef MIRRORS_OWNED
   bool photons;  // lamps' light that it mirrors arrives as photons of caustics
+  float others;  // share of what it mirrors of lights that photons do not answer for: virtual lights send the rest
   bool glass;
 #endif
 #ifdef SMOOTH_MIRRORS
@@ -300,6 +301,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, float mirror_limit, 
 #ifdef MIRRORS_OWNED
   int material = triangle_material(hit);
   met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
+  met.others = 1.0;
   met.glass = triangle_is_glass(hit);
 #endif
 #ifdef SMOOTH_MIRRORS
@@ -415,9 +417,10 @@ Reflection straight_reflection(Vertex met, Light light)
   Reflection reflection = met.reflection;
   reflection.diffuse *= met.straight;
 #ifdef MIRRORS_OWNED
-  if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
-    reflection.straight = reflection.grazing = vec3(0.0);
-  }
+  bool answered = (light.flags & LIGHT_GLASS_BLOCKS) != 0;
+  float mirrored = !answered ? met.others : met.photons ? 0.0 : 1.0;
+  reflection.straight *= mirrored;
+  reflection.grazing *= mirrored;
 #endif
 #ifdef GLASS_SHEETS
   if (met.within && LIGHT_IS(light, LIGHT_DIRECTION)) {

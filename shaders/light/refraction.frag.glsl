@@ -259,6 +259,7 @@ void main()
       rest.met.reflection.alpha = 1.0;
 #ifdef MIRRORS_OWNED
       rest.met.photons = false;
+      rest.met.others = 1.0;
       rest.met.glass = false;
 #endif
 #ifdef SMOOTH_MIRRORS
