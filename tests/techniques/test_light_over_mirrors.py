@@ -94,13 +94,16 @@ def diffuse_indirect(stage, engine, samples, seed=1):
 
 @pytest.mark.parametrize("roughness", [0.24, 0.3, 0.45])
 def test_a_metal_wall_throws_a_lamps_light_by_its_own_lobe(stage, roughness):
-    """Smooth or rough: by photons. Lobes of paths, of roughness .5, brought .955 of it from .25 on, .99 below."""
+    """As photons, smooth or rough, at one sample, too. Virtual lights had .86 and .89 of it there from a roughness of .25
+    on, with errors of 1.2 and 1.3, and .95 and .98 at 16 samples."""
     ground(stage)
     upright(stage, 1.0, polish(stage, roughness=roughness))
     stage.light("POINT", (-0.2, 0, 1.6), shadow_soft_size=0.5)
-    ours, theirs = diffuse_indirect(stage, "CANDELA", 32), diffuse_indirect(stage, "CYCLES", 512)
-    print(f"{roughness}: {ours.mean() / theirs.mean():.3f}")
-    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.025)
+    ours, theirs = diffuse_indirect(stage, "CANDELA", 1), diffuse_indirect(stage, "CYCLES", 512)
+    error = np.mean((ours - theirs) ** 2 / (theirs**2 + (0.1 * theirs.mean()) ** 2))
+    print(f"{roughness}: {ours.mean() / theirs.mean():.3f}, {error:.4f}")
+    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.06)
+    assert error < 0.1
 
 
 def test_an_upright_mirror_sends_no_light_of_a_floor_back_to_it(stage):
