@@ -352,22 +352,24 @@ def _shared(compiled: CompiledMaterial, is_camera: bool = False) -> dict:
     varyings = tuple(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count))
     if own is not None and own.shell:  # which finds what corners have in a list
         fill, inputs, varyings = "", (("VEC2", "shell"),), (("flat", "INT", "shell_triangle"),)
+    wide = is_camera and _strand_defines(compiled)
     return {
         "vertex": "surface/shell.vert.glsl" if own is not None and own.shell else "surface/surface.vert.glsl",
         "inputs": (("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance"), *inputs),
         "varyings": (
             ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"),
             ("smooth", "VEC3", "normal_heights"), ("flat", "IVEC2", "instance_flat"), *varyings,
+            *(STRAND_VARYINGS if wide else ()),
         ),
         "textures": (
             ("RGBA32F", "instances"), ("RGBA32F", "energy_table"),
             *(("FLOAT_2D", f"material_image{k}") for k in range(len(compiled.images))),
             *(own.textures if own else ()),
         ),
-        "writes_depth": own is not None,
+        "writes_depth": own is not None or bool(wide),
         "snippets": (
             ("generated/own_surface", own.glsl if own else ""),
-            ("generated/strands", STRANDS * compiled.strands + WIDE * bool(is_camera and _strand_defines(compiled))),
+            ("generated/strands", STRANDS * compiled.strands + WIDE * bool(wide)),
             ("generated/attributes", f"void copy_attributes()\n{{\n{copy}}}\n"),
             (
                 "generated/material",
@@ -437,6 +439,9 @@ def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
     return tuple((name, "") for name, is_so in kinds.items() if is_so) + _own_defines(compiled)
 
 
+STRAND_VARYINGS = tuple(
+    ("smooth", kind, f"strand_{name}") for kind, name in (("VEC4", "across"), ("VEC3", "along"), ("VEC4", "aside"))
+)
 STRANDS, WIDE = "#define STRANDS\n", '#include "surface/strand.glsl"\n'
 
 
@@ -490,7 +495,7 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
         outputs=tuple(("VEC4", f"out_{name}") for name in SCATTER_IMAGES),
         constants=BEFORE_CONSTANTS,
         textures=(*like.textures, ("RGBA32F", "scatter_objects")),
-        snippets=_shared(compiled, True)["snippets"],
+        **{name: _shared(compiled, True)[name] for name in ("snippets", "varyings")},
         defines=(
             *CAMERA_DEFINES,
             *AVERAGING_DEFINES,

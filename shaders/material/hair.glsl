@@ -39,13 +39,18 @@ void shader_fibre(inout Closures closures, SurfacePoint point, vec3 weight, vec4
   vec3 tangent = world_from_object(point, on_mesh ? (point.backfacing ? -off_axis.xyz : off_axis.xyz) : way.xyz);
   float size = length(tangent);
   tangent /= max(size, 1e-20);
+#ifdef WIDENS_STRANDS
+  bool is_round = normal_heights.z < 0.0;  // its normal is that of a round strand already (surface/point.glsl)
+#else
+  bool is_round = false;
+#endif
   // A tube of few sides has the normals of a round one where it is seen, by how far off its axis that is.
   vec3 across = cross(tangent, point.incoming);
   float sine = length(across);
   if (on_mesh) {
     n = point.geometric_normal;
   }
-  else if (size > 0.0 && sine > 1e-4 && dot(off_axis.xyz, off_axis.xyz) > 0.0) {
+  else if (!is_round && size > 0.0 && sine > 1e-4 && dot(off_axis.xyz, off_axis.xyz) > 0.0) {
     across /= sine;
     float beside = dot(world_from_object(point, off_axis.xyz), across) / size;
     beside = clamp(beside / tube_width(point.geometric_normal, across, cross(across, tangent), beside, off_axis.w), -1.0, 1.0);

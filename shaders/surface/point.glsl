@@ -27,6 +27,11 @@ vec2 window_steps(vec3 step, vec3 plane_normal)
 vec2 smooth_lift(Instance instance, bool back)
 {
   float reach = length(world_normal);
+#ifdef WIDENS_STRANDS
+  if (normal_heights.z < 0.0) {
+    return vec2(0.0);  // strands are round as they are met
+  }
+#endif
   if (reach <= 0.0) {
     return vec2(0.0);
   }
@@ -38,11 +43,58 @@ vec2 smooth_lift(Instance instance, bool back)
 }
 
 #ifdef WIDENS_STRANDS
-// Whether the strand is drawn wider than it is here: minus its share of the width is 0 of what is no strand, -1 where all
-// is kept (surface.vert.glsl).
-bool strand_is_thin()
+#include "lib/random.glsl"
+#define STRAND_CLEAR 1.02  // radii of the tube's corners, of which each is known to 3 % where strands bend
+
+// Whether a fragment is one of a strand that is round and drawn wider than it is (surface/strand.glsl).
+bool strand_is_round()
 {
-  return normal_heights.z < 0.0 && normal_heights.z > -0.9999;
+  return normal_heights.z < 0.0;
+}
+
+// Where the pixel's ray runs beside the fragment's, in half pixels: the same for all strands.
+vec2 strand_looks()
+{
+  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) ^ 0x68bc21ebu));
+  return 2.0 * vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz)) - 1.0;
+}
+
+// How far beside its axis that ray meets the strand, in radii.
+float strand_beside()
+{
+  return (strand_across.z + dot(strand_aside.xy, strand_looks())) / -normal_heights.z;
+}
+
+bool strand_is_met()
+{
+  return abs(strand_beside()) < 1.0;
+}
+
+// Where a strand is met. What is seen of it is round, and goes around the tube's corners, so that rays from it do not meet the
+// tube's own facets; of the far side, that open ends show, the tube will do.
+void strand_meets(inout SurfacePoint point)
+{
+  vec3 along = safe_normalize(strand_along);
+  float narrowing = dot(along, point.geometric_normal);  // of what faces the viewer: by so much along the strand
+  float further = dot(strand_aside.zw, strand_looks());
+  if (point.backfacing) {
+    point.position += (along - narrowing * point.geometric_normal) * further;
+    return;
+  }
+  vec3 side = cross(along, point.incoming);
+  float sine = length(side);
+  side /= max(sine, 1e-20);
+  vec3 before = cross(side, along);
+  float beside = clamp(strand_beside(), -1.0, 1.0);
+  float height = sqrt(1.0 - beside * beside);
+  vec3 out_there = side * beside + before * height;
+  float radius = STRAND_CLEAR * strand_across.w;
+  further += (radius * height - strand_across.y) * dot(along, point.incoming) / max(sine, 0.2);
+  point.position += radius * out_there - side * strand_across.x - before * strand_across.y
+                    + (along - narrowing * out_there) * further;
+  point.normal = safe_normalize(out_there);
+  point.mesh_normal = point.normal;
+  point.geometric_normal = point.normal;
 }
 #endif
 
@@ -87,6 +139,11 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
   point.position_dx *= width;
   point.position_dy *= width;
   fill_attributes(point, window_steps(point.position_dx, flat_normal), window_steps(point.position_dy, flat_normal));
+#ifdef WIDENS_STRANDS
+  if (strand_is_round()) {
+    strand_meets(point);
+  }
+#endif
   return point;
 }
 

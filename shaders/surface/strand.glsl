@@ -1,14 +1,17 @@
-// Strands of hair that are thinner than a pixel. All pixels look at the same place of their filters in a sample, so that
-// thin ones in step with the grid would be met by all samples of a row or by none. Those below WIDENED are drawn so wide
-// instead that each row of pixels (each column, of strands that lie flat) meets them once, and a fragment is kept with the
-// share of that width that the strand has (surface.frag.glsl): what is seen of it is the same in the mean.
+// Strands of hair. All pixels look at the same place of their filters in a sample, so that strands thinner than a pixel, in step
+// with the grid, would be met by all samples of a row or by none. So each pixel looks elsewhere within a pixel around that place:
+// strands are drawn wider by as much, and a fragment is kept where the pixel's ray meets the strand (surface/point.glsl), and
+// shaded there as a round strand. One ray for all strands of a pixel: what hides a strand is what shades it from the viewer's
+// side. Were each kept by a chance of its own, the camera would see places that others shade (2 to 4 % of a tuft's light).
 // `envelope` of its vertices: radius in local metres; minus (sides x steps + x) x steps + y, with x and y the strand's
 // direction on an octahedron (addon/snapshot/strands.py, strand_shape). Vertices lie about the axis along their normals.
 #include "lib/math.glsl"
 #include "lib/view.glsl"
 
 #define AXIS_STEPS 1024
-#define WIDENED 0.7  // of a pixel: thicker strands are met as they are, and shaded where they are seen
+// Pixels: strands as wide are met at the pixels' own places, those a pixel thinner and less anywhere within a pixel.
+#define AS_IT_IS 1.65
+#define MOST_ALONG 4.0  // how far along a strand a pixel beside may meet it, in widths of a pixel (strands seen end on)
 
 vec3 strand_axis(int code)
 {
@@ -33,15 +36,29 @@ vec2 pixels_of(vec3 step, vec3 clip)
   return moved / clip.z * (0.5 * film_view.film.xy);
 }
 
-// Where a strand's vertex is drawn; `share`: of its width there, what the strand has of it.
-vec3 strand_vertex(Instance instance, vec3 place, vec3 local_normal, out float share)
+// How a strand's vertex is drawn. Lengths are in metres, which between vertices run evenly.
+struct StrandVertex {
+  vec3 drawn;        // where
+  float half_width;  // of the strand as it is seen; 0: drawn as it is
+  vec4 across;       // how far the tube's corner lies beside its axis, and before it; how far beside it it is drawn; the tube's
+                     // radius out to its corners
+  vec3 along;        // the strand's direction
+  vec4 looks;        // how far beside the axis (xy) and along it (zw) what lies half a pixel aside in the picture's x and y is
+};
+
+StrandVertex strand_vertex(Instance instance, vec3 place, vec3 local_normal)
 {
-  share = 1.0;
+  StrandVertex found;
+  found.drawn = place;
+  found.half_width = 0.0;
+  found.across = vec4(0.0);
+  found.along = vec3(0.0);
+  found.looks = vec4(0.0);
   int code = int(-envelope.y);
   vec3 axis = strand_axis(code);
   vec3 off = local_normal - axis * dot(local_normal, axis);
   if (dot(off, off) < 0.25) {
-    return place;
+    return found;
   }
   off = normalize(off);
   vec3 out_one = of_instance(instance, off);
@@ -52,22 +69,33 @@ vec3 strand_vertex(Instance instance, vec3 place, vec3 local_normal, out float s
   vec3 to_eye = view_is_parallel(film_view.eye) ? film_view.backward.xyz : film_view.eye.xyz - place;
   vec3 side = cross(along, to_eye);
   if (clip.z <= 0.0 || dot(side, side) < 1e-6 * dot(along, along) * dot(to_eye, to_eye)) {
-    return place;
+    return found;
   }
   side = normalize(side);
+  along = normalize(along);
+  vec3 before = cross(side, along);
   vec2 running = pixels_of(along, clip);
   vec2 beside = pixels_of(side, clip);
-  // Half the width in metres, by the radius, and that in pixels for each metre.
+  // Half the width in metres, by the radius.
   float grown = length(vec2(dot(out_one, side), dot(out_other, side)));
-  float per_metre = abs(running.x * beside.y - running.y * beside.x) / max(length(running), 1e-30);
-  // A pixel along the axis of the picture that the strand crosses more steeply.
-  float wanted = 0.5 * max(abs(running.x), abs(running.y)) / max(length(running), 1e-30) / max(per_metre, 1e-30);
-  float own = grown * envelope.x;
-  if (own >= WIDENED * wanted || grown <= 0.0) {
-    return place;
+  float turned = running.x * beside.y - running.y * beside.x;
+  if (grown * envelope.x <= 0.0 || turned == 0.0) {
+    return found;
   }
-  share = own / wanted;
   float sides = float(code / (AXIS_STEPS * AXIS_STEPS));
-  float wider = PI / (sides * sin(PI / sides));
-  return place + out_one * (wider * (wanted / grown - envelope.x));
+  float wider = PI / (sides * sin(PI / sides));  // of the tube's corners than of the strand
+  vec2 corner = wider * envelope.x * vec2(dot(out_one, side), dot(out_one, before));
+  found.half_width = grown * envelope.x;
+  vec2 aside = vec2(-running.y, running.x) * (0.5 / turned);
+  vec2 ahead = vec2(beside.y, -beside.x) * (0.5 / turned);
+  float half_pixel = length(aside);
+  float share = clamp(AS_IT_IS - found.half_width / half_pixel, 0.0, 1.0);
+  found.looks = share * vec4(aside, ahead * min(1.0, MOST_ALONG * half_pixel / max(length(ahead), 1e-30)));
+  float looks = abs(found.looks.x) + abs(found.looks.y);
+  // The middle of a facet, too, lies as far out as the strand's rim.
+  float rim = (found.half_width + looks) / (found.half_width * wider * cos(PI / sides));
+  found.across = vec4(corner, corner.x * rim, wider * found.half_width);
+  found.along = along;
+  found.drawn = place + side * (found.across.z - corner.x);
+  return found;
 }

@@ -42,14 +42,10 @@ void main()
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
 #ifdef WIDENS_STRANDS
-  // Of a strand that is drawn wider than it is, the near side alone, and of that its share.
-  bool strand_kept = true;
-  for (bool thin = strand_is_thin(); thin; thin = false) {
-    strand_kept = !point.backfacing && shuffled(film_view.sample_index, layer.xy) < -normal_heights.z;
-  }
-  if (!strand_kept) {
+  if (strand_is_round() && !strand_is_met()) {
     discard;
   }
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
 #endif
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
 #ifdef ONE_LOBE

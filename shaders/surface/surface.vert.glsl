@@ -18,15 +18,22 @@ void main()
   normal_heights.x = dot(world_position - instance_origin(instance), world_normal);
   normal_heights.yz = (instance_volume(instance) * unit) * envelope;
   vec3 drawn = world_position;
+#ifdef WIDENS_STRANDS
+  strand_across = vec4(0.0);
+  strand_along = vec3(0.0);
+  strand_aside = vec4(0.0);
+#endif
 #ifdef STRANDS
   for (bool is_strand = envelope.y < 0.0; is_strand; is_strand = false) {
     normal_heights.yz = vec2(0.0);
 #ifdef WIDENS_STRANDS
-    // -1 where all is kept, so that between vertices that are kept whole and others the share runs on.
     for (bool widens = film_view.visibility == FLAG_CAMERA; widens; widens = false) {
-      float share;
-      drawn = strand_vertex(instance, world_position, normal, share);
-      normal_heights.z = -share;
+      StrandVertex strand = strand_vertex(instance, world_position, normal);
+      drawn = strand.drawn;
+      normal_heights.z = -strand.half_width;
+      strand_across = strand.across;
+      strand_along = strand.along;
+      strand_aside = strand.looks;
     }
 #endif
   }

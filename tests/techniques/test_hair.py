@@ -68,8 +68,7 @@ def test_a_fibre_scatters_across_itself_what_the_closed_form_says(stage, turn):
     stage.scene.camera.data.type, stage.scene.camera.data.ortho_scale = "ORTHO", SPAN
     stage.light("SUN", turn=(np.pi / 2, 0, np.pi * turn), energy=SUN)
     picture = stage.render(4, (48, 36))["combined"][14:22, :, :3].mean(axis=0)
-    corners = np.pi / (12 * np.sin(np.pi / 12))  # radii from the axis to those of its tube, two of which are its edges
-    h = (0.5 - (np.arange(48) + 0.5) / 48) * SPAN / (RADIUS * corners)  # as the sun goes around
+    h = (0.5 - (np.arange(48) + 0.5) / 48) * SPAN / RADIUS  # as the sun goes around
     inner = np.abs(h) < 0.9
     eumelanin = -np.log(0.7) * np.array([0.343, 0.733, 1.924])  # redness 1
     for channel, absorption in enumerate(eumelanin):
@@ -95,14 +94,16 @@ def test_a_card_is_a_fibre_along_its_first_edge(stage, turn, sun):
 
 
 def test_strands_light_each_other_through_themselves(stage):
-    """Red of Cycles' ribbons, 512 samples; of it .1061 comes from the lamp straight."""
+    """Red of Cycles' ribbons, 512 samples; of it .0780 comes from the lamp straight (strands of .7 pixels through
+    a filter of 1.5; at the pixels' centres alone, where strands stand in step with them, Cycles has .1357 of .1061)."""
+    stage.scene.render.filter_size = 1.5
     rows = [[(-1 + 0.05 * k, 0.3 * (-1) ** k, z) for z in np.linspace(0, 1, 4)] for k in range(41)]
     fibre(stage, rows, 0.03, Melanin=0.25)
     stage.camera((0, -5, 0.5), (np.pi / 2, 0, 0))
     stage.scene.camera.data.type, stage.scene.camera.data.ortho_scale = "ORTHO", 2.0
     stage.light("AREA", (1, -4, 1.5), (np.pi / 2 - 0.24, 0, 0.24), energy=150.0, size=0.5)
     red = stage.render(8, (48, 36), bounces=2)["combined"][12:24, 8:40, 0]
-    np.testing.assert_allclose(red.mean(), 0.1357, rtol=0.03)
+    np.testing.assert_allclose(red.mean(), 0.1050, rtol=0.03)
 
 
 @pytest.mark.slow
@@ -169,6 +170,25 @@ def test_strands_thinner_than_a_pixel_keep_their_light(stage, width, roll, lean)
     glow = stage.render(16, (64, 64))["combined"][..., 0].mean() * 16.0
     met = len(places) * (2.5 * 64 / 4) * 16 * width
     assert glow == pytest.approx(len(places) * 2.5 * 2 * radius, rel=0.02 + 2.5 * np.sqrt((1 - width) / met))
+
+
+def test_a_lamp_at_the_camera_shadows_little_that_is_seen_of_dense_strands(stage):
+    """Of strands thinner than a pixel, too: what one hides is not seen of another. Strands are shadowed as tubes of
+    flat sides; when each was kept by a chance of its own, .81 of their light was left."""
+    draw = np.random.default_rng(1)
+    middle, way = draw.uniform(-0.5, 0.5, (200, 3)), draw.normal(size=(200, 3)) * (1, 0.5, 1)
+    way *= 1.5 / np.linalg.norm(way, axis=1)[:, None]
+    hair = fibre(stage, np.stack([middle - way, middle, middle + way], axis=1), 0.016)
+    hair.materials[0] = stage.diffuse(1.0)
+    camera = stage.camera((0, -4, 0), (np.pi / 2, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.8
+    lamp = stage.light("SUN", turn=(np.pi / 2, 0, 0), energy=3.0, angle=0.0)
+    stage.scene.candela.slot_shadow, stage.scene.candela.accumulated_maps_by = "accumulated_maps", "RAYS"
+    lit = []
+    for lamp.data.use_shadow in (False, True):
+        lit.append(stage.render(16, (16, 12))["combined"][..., 0].mean())
+    print(f"shadowed {lit[1]:.4f}, of {lit[0]:.4f}: {lit[1] / lit[0]:.4f}")
+    assert lit[1] > 0.96 * lit[0]
 
 
 @pytest.mark.parametrize("ends", [(1.2, 0.1), (1.02, 0.9), (0.9, 0.1)])  # pixels
