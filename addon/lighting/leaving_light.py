@@ -2,10 +2,11 @@
 
 In samples in which somebody asks, walks from points of the mesh (scene/scatter_points.py) find what leaves there of
 the direct light of all points: from all of them in the first such samples, later from every `stride`-th row in turn.
-Their mean over the samples so far, with a grid of voxels around each object, stands in one list, an image, so that rays
-find it where they meet a surface (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The
-list is written anew when the number of samples has doubled, or grown by RENEWED. Of indirect light they send on what
-leaves on the side where it came from.
+Their mean over the samples so far and over points around, within some .7 of a free path, stands with a grid of voxels
+around each object in one list, an image, so that rays find it where they meet a surface
+(shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The list is written anew when the
+number of samples has doubled, or grown by RENEWED. Of indirect light they send on what leaves on the side where it came
+from.
 
 | cost | per sample |
 |---|---|
