@@ -10,7 +10,9 @@ from addon.gfx.struct import Block
 from addon.kernels.convolution import PYRAMID, Basis, series
 from addon.lighting.edge_tiles import COUNT, EDGE_LIGHT
 from addon.lighting.light_choice import Choice
+from addon.scene.view import VIEW
 from addon.surfaces import hits
+from addon.techniques.caustics_mapping import APPLY
 from tests.glsl import evaluated
 from tests.techniques.test_shader_functions import drawn
 
@@ -170,3 +172,27 @@ def test_a_box_of_one_depth_is_nearer_than_what_lies_beyond_and_to_nothing_befor
     apart = np.abs(beyond) > offset + 0.005
     np.testing.assert_allclose(found[apart, 0], beyond[apart] > 0, atol=5e-3)
     assert apart.sum() > 40
+
+
+def test_a_caustic_map_is_read_between_its_texels(gpu_context):
+    """Irradiance that grows evenly over a map of the square from -1 to 1, as a parallel view shows it."""
+    random, side = np.random.default_rng(5), 8
+    at = (np.arange(side) + 0.5) * 2 / side - 1
+    x, y = np.meshgrid(at, at)
+    texels = np.stack([x, y, 0 * x, 0 * x + 1], axis=-1)
+    places = np.zeros((3, 4, 4))
+    places[..., :2], places[..., 3] = random.uniform(at[0], at[-1], (3, 4, 2)), 1.0
+    fields = {name: np.zeros(4) if kind == "vec4" else 0 for name, (kind, _) in VIEW.fields.items()}
+    fields |= {"row_x": np.eye(4)[0], "row_y": np.eye(4)[1], "row_w": np.eye(4)[3], "eye": np.eye(4)[3]}
+    fields |= {"frame": (-1.0, 1.0, -1.0, 1.0), "film": (side, side, 0.0, 2.0)}
+    read = {
+        "surface_position": places, "surface_normal": 0 * places, "surface_diffuse": 0 * places + 0.5,
+        "receiver_position": texels, "receiver_normal": 0 * texels,
+        "caustic_map": np.stack([x + 2, y + 2, x + y + 4, 0 * x], axis=-1),
+    }  # fmt: skip
+    with images.borrowed(4, 3, "RGBA32F") as found:
+        textures = {name: images.upload(pixels) for name, pixels in read.items()}
+        passes.fullscreen(APPLY, found, textures=textures, blocks={"map_view": Block(VIEW, **fields)})
+        light = images.read(found.colors[0])[..., :3]
+    x, y = places[..., 0], places[..., 1]
+    np.testing.assert_allclose(light, np.stack([x + 2, y + 2, x + y + 4], axis=-1) * 0.5 / np.pi, rtol=1e-3)
