@@ -1,5 +1,6 @@
 // Light of other surfaces that arrives at what rays have met and is sent on along them: of virtual lights and near surfaces
 // (indirect/near.glsl). A program beside received.frag.glsl, since a driver compiles each while a viewport waits.
+#define LIT_BY_MAPS
 #define PART 128  // virtual lights that a hit looks at
 #include "hits/receiver.glsl"
 #include "indirect/near.glsl"
@@ -29,6 +30,10 @@ vec3 indirect_light(Receiver r, uvec3 roll)
   sum += arriving * reflection_of(reflection, lit, from, r.viewer);
   Walk walk;
   vec3 weight;
+#ifdef MIRRORS_OWNED
+  mapped_position = position;
+  mapped_normal = side;
+#endif
   walk.direction = reflection_sample(reflection, lit, r.viewer, vec2(to_unit(roll.x), to_unit(roll.y)), weight);
   if (dot(walk.direction, side) > 0.0 && max_component(weight) > 0.0) {
     walk.origin = ray_origin(position, side);

@@ -410,6 +410,21 @@ float even_share(Vertex met)
   return 1.0 - 0.87 * (1.0 - met.upright);
 }
 
+#if defined(LIT_BY_MAPS) && defined(MIRRORS_OWNED)
+// Where a walk begins at what a ray of a lobe has met: photons come there by maps of what lights see (caustics/at_hits.frag.glsl).
+vec3 mapped_position;
+vec3 mapped_normal;
+
+// Whether this light's map may show that place: one that faces away from the light is in none.
+bool light_maps(Light light)
+{
+  vec3 direction;
+  float density;
+  light_sample(light, mapped_position, direction, density);
+  return dot(direction, mapped_normal) > 0.0;
+}
+#endif
+
 // What reflects light straight from this source: not the lobe where photons bring what that mirrors, nor, of the world, where
 // rays that a sheet of glass mirrors find it.
 Reflection straight_reflection(Vertex met, Light light)
@@ -418,7 +433,11 @@ Reflection straight_reflection(Vertex met, Light light)
   reflection.diffuse *= met.straight;
 #ifdef MIRRORS_OWNED
   bool answered = (light.flags & LIGHT_GLASS_BLOCKS) != 0;
-  float mirrored = !answered ? met.others : met.photons ? 0.0 : 1.0;
+  bool brought = answered && met.photons;
+#ifdef LIT_BY_MAPS
+  brought = brought && light_maps(light);
+#endif
+  float mirrored = !answered ? met.others : brought ? 0.0 : 1.0;
   reflection.straight *= mirrored;
   reflection.grazing *= mirrored;
 #endif

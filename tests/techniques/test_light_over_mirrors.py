@@ -151,3 +151,19 @@ def test_light_by_way_of_mirrors_is_that_of_cycles(stage, scene):
     if scene != "lit ring":  # footprints of photons reach through its wall
         dark = theirs < np.median(theirs[theirs > 0])
         assert ours[dark].mean() == pytest.approx(theirs[dark].mean(), rel=0.08, abs=0.02 * float(theirs.mean()))
+
+
+def test_a_mirror_shows_what_it_lights_on_a_wall_that_faces_away_from_the_lamp(stage):
+    """A map of what the lamp sees does not have that wall: there rays bring what the mirror throws. Before the
+    mirror and in it the wall is as bright."""
+    stage.mesh([(-0.5, 0, 0), (0.5, 0, 0), (0.5, 0, 1), (-0.5, 0, 1)], [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    mirror = stage.material("ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.0)
+    stage.mesh([(-1.5, 1, 0), (1.5, 1, 0), (1.5, 1, 2.2), (-1.5, 1, 2.2)], [(0, 1, 2, 3)], material=mirror)
+    stage.light("AREA", (0, -0.5, 2.2), turn=(0.9, 0, 0), energy=50.0, size=0.3)
+    found = []
+    for y, turn in ((0.9, np.pi), (0.1, 0.0)):
+        camera = stage.camera_above(0.6)
+        camera.location, camera.rotation_euler = (0, y, 0.5), (np.pi / 2, 0, turn)
+        found.append(stage.render(16, (12, 12), bounces=3)["combined"][..., 0].mean())
+    assert found[0] > 0.1
+    assert found[1] == pytest.approx(found[0], rel=0.1)
