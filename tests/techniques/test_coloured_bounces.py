@@ -232,3 +232,28 @@ def test_bounced_light_is_absorbed_in_glass_that_it_passes(stage):
     cosine = cosine[cosine > np.cos(np.arctan(10.0 / 3.0))]
     expected = [np.exp(-a * thick / cosine).mean() for a in per_metre]
     assert found[1] / found[0] == pytest.approx(np.array(expected), rel=0.05)
+
+
+def test_bounced_light_passes_a_thin_wall_in_its_base_colour(stage):
+    """Two faces with what they mirror to and fro, and the base colour by the way between them."""
+    base, ior = np.array(COLOR), 1.5
+    made = stage.principled()
+    if "Thin Wall" not in made.node_tree.nodes[0].inputs:
+        pytest.skip("this Blender's Principled has no thin wall")
+    found = []
+    for walled in (False, True):
+        below_a_lit_ceiling(stage)
+        if walled:
+            wall = stage.principled(
+                Base_Color=(*base, 1), Transmission_Weight=1.0, Thin_Wall=True, Roughness=0.0, IOR=ior
+            )
+            stage.rectangle((-9, -9), (9, 9), 1.0, material=wall).visible_camera = False
+        lit = [stage.render(8, (16, 16), bounces=1, seed=seed)["diffuse_indirect"] for seed in range(4)]
+        found.append(np.mean(lit, axis=(0, 1, 2))[:3])
+    cosine = np.sqrt((np.arange(1000) + 0.5) / 1000)[:, None]
+    cosine = cosine[cosine[:, 0] > np.cos(np.arctan(10.0 / 3.0))]  # the ceiling's rim cuts off the rest
+    inside = np.sqrt(1.0 - (1.0 - cosine**2) / ior**2)
+    across, along = ((a - b) / (a + b) for a, b in ((cosine, ior * inside), (ior * cosine, inside)))
+    face, absorbed = (across**2 + along**2) / 2, base ** (1.0 / inside)
+    expected = ((1.0 - face) ** 2 * absorbed / (1.0 - (face * absorbed) ** 2)).mean(axis=0)
+    assert found[1] / found[0] == pytest.approx(expected, rel=0.06)
