@@ -32,7 +32,7 @@ import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bench import drawn_mutations
+from bench import ages, drawn_mutations
 from bench.cells import ROOT
 from bench.markdown import table, write_whole
 
@@ -96,11 +96,10 @@ def is_stale(mutation: Mutation, root: Path = ROOT) -> bool:
 
 
 def copy_of_tree(folder: Path) -> None:
-    """What git tracks or would track, as it stands in the working tree."""
-    listed = subprocess.run(
-        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT, check=True, capture_output=True, text=True,
-    ).stdout  # fmt: skip
+    """What git tracks or would track, as it stands in the working tree. ValueError outside of a clone."""
+    listed = ages.git("ls-files", "-z", "--cached", "--others", "--exclude-standard")
+    if listed is None:
+        raise ValueError(f"{ROOT} is no clone: what is copied is what git tracks.")
     for name in filter(None, listed.split("\0")):
         source, place = ROOT / name, folder / name
         if source.is_file():
@@ -278,7 +277,11 @@ def command(options: argparse.Namespace) -> int:
             before.setdefault(one.name, {"state": NOT_JUDGED, "by": "", **_place_in_line(one)})
     sound: dict[tuple[str, ...], str] = {}
     with tempfile.TemporaryDirectory(prefix="candela_mutations_") as folder:
-        copy_of_tree(Path(folder))
+        try:
+            copy_of_tree(Path(folder))
+        except ValueError as error:
+            print(error)
+            return 2
         for one in wanted:
             started = time.monotonic()
             known = before[one.name]["state"] if options.drawn else NOT_JUDGED

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from bench import drawn_mutations, mutations
+from bench import ages, drawn_mutations, mutations
 from bench.mutations import BROKEN, EQUIVALENT, KILLED, STALE, SURVIVED, Mutation
 
 SOURCE = "def double(x):\n    return 2 * x\n"
@@ -73,9 +73,17 @@ def test_an_entry_that_says_nothing_is_refused(tmp_path, entry, words):
 
 
 def test_the_working_tree_is_copied_without_what_git_ignores(tmp_path):
+    if ages.git("rev-parse", "HEAD") is None:
+        pytest.skip("this is no clone")
     mutations.copy_of_tree(tmp_path)
     assert (tmp_path / "bench" / "mutations.toml").is_file() and (tmp_path / "pyproject.toml").is_file()
     assert not list(tmp_path.rglob("__pycache__")) and not (tmp_path / ".git").exists()
+
+
+def test_outside_of_a_clone_a_sentence_says_what_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setattr(mutations.ages, "git", lambda *_: None)
+    with pytest.raises(ValueError, match="no clone"):
+        mutations.copy_of_tree(tmp_path)
 
 
 def test_drawn_wrongs_are_the_same_for_a_seed_and_change_code_alone():
