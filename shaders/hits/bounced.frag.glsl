@@ -1,12 +1,13 @@
 // Light of other surfaces that arrives at what rays have met and is sent on along them: of virtual lights and near surfaces
 // (indirect/near.glsl). A program beside received.frag.glsl, since a driver compiles each while a viewport waits.
 #define LIT_BY_MAPS
+#define BOUNCED
 #define PART 128  // virtual lights that a hit looks at
 #include "hits/receiver.glsl"
 #include "indirect/near.glsl"
 
 // By virtual lights, and by a short ray for what those leave out.
-vec3 indirect_light(Receiver r, uvec3 roll)
+vec3 light_of_turn(Receiver r, uvec3 roll)
 {
   vec3 sum = vec3(0.0);
   Reflection reflection = surface_reflection(r.surface, max(dot(r.surface.geometric_normal, r.viewer), 0.0));
@@ -22,7 +23,7 @@ vec3 indirect_light(Receiver r, uvec3 roll)
     lit = passes ? -lit : lit;
     side = passes ? -side : side;
   }
-  if (max_component(reflection.diffuse + reflection.grazing) <= 0.0) {
+  if (r.mirrored >= bounces || max_component(reflection.diffuse + reflection.grazing) <= 0.0) {
     return sum;
   }
   vec3 from;
@@ -47,23 +48,4 @@ vec3 indirect_light(Receiver r, uvec3 roll)
   return sum;
 }
 
-void main()
-{
-  show_nothing();
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  Receiver r;
-  if (!receiver_at(pixel, r) || r.mirrored >= bounces) {
-    return;
-  }
-  uvec3 roll = receiver_roll(pixel);
-  vec3 straight;
-  vec3 onward;
-  light_left(r, roll.y, straight, onward);
-  r.surface.diffuse = onward;
-  vec3 sum = vec3(0.0);
-  for (int k = 0; k < repeats; k++) {
-    roll = hash3(roll);
-    sum += indirect_light(r, roll);
-  }
-  show_sent(r, sum / float(repeats));
-}
+#include "hits/in_turns.glsl"

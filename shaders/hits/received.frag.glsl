@@ -36,8 +36,24 @@ vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, flo
   return sum * arriving;
 }
 
-vec3 direct_light(Receiver r, uint salt)
+// What emissive triangles close by bring that their points leave out; a lobe that a ray follows finds them by that.
+vec3 light_close_by(Receiver r, Light light, uint salt)
 {
+  vec3 side = r.surface.geometric_normal;
+  vec3 direction;
+  vec3 arriving = emission_close_by(light, ray_origin(r.surface.position, side), r.surface.normal, salt, direction);
+  if (max_component(abs(arriving)) <= 0.0 || dot(direction, side) <= 0.0) {
+    return vec3(0.0);
+  }
+  r.shines = r.shines && !r.followed;
+  r.bends = false;
+  return reflected_light(r, light, arriving * (PI / max(dot(direction, r.surface.normal), 1e-6)), direction, 0.0);
+}
+
+// By a point on one of the sources, drawn in proportion to what it brings unblocked.
+vec3 light_of_points(Receiver r, uint salt, out int emissive)
+{
+  emissive = -1;
   float total = 0.0;
   float chosen_share = 0.0;
   int chosen = -1;
@@ -51,6 +67,7 @@ vec3 direct_light(Receiver r, uint salt)
       continue;
     }
 #endif
+    emissive = LIGHT_IS(light, LIGHT_SURFACE) ? i : emissive;
     vec3 direction;
     float density;
     vec3 arriving = light_sample(light, r.surface.position, direction, density);
@@ -93,22 +110,15 @@ vec3 direct_light(Receiver r, uint salt)
   return blocked ? vec3(0.0) : chosen_light * (total / chosen_share);
 }
 
-void main()
+vec3 light_of_turn(Receiver r, uvec3 roll)
 {
-  show_nothing();
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  Receiver r;
-  if (!receiver_at(pixel, r)) {
-    return;
+  int emissive;
+  vec3 sum = light_of_points(r, roll.x, emissive);
+  // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+  for (; emissive >= 0; emissive = -1) {
+    sum += light_close_by(r, light_read(emissive), roll.x);
   }
-  uvec3 roll = receiver_roll(pixel);
-  vec3 straight;
-  vec3 onward;
-  vec3 sum = float(repeats) * light_left(r, roll.y, straight, onward);
-  r.surface.diffuse = straight;
-  for (int k = 0; k < repeats; k++) {
-    sum += direct_light(r, roll.x);
-    roll = hash3(roll);
-  }
-  show_sent(r, sum / float(repeats));
+  return sum;
 }
+
+#include "hits/in_turns.glsl"
