@@ -411,16 +411,16 @@ def test_one_sample_mirrors_faintly(stage):
 
 
 def test_a_mirror_shows_a_board_where_a_thin_lamp_touches_it(stage):
-    """Points of light stand for more than the sheet is high. Beside a long sheet of height c a board has, up to the
-    distance y, the mean irradiance  pi L (y + c - sqrt(y^2 + c^2)) / 2 y."""
-    height, half = 0.01, 0.1
+    """Points of light stand for more than the sheet is high. Beside a long sheet of height c a board has at the distance y
+    the irradiance  pi L (1 - y / sqrt(y^2 + c^2)) / 2. Points alone brought .23 of it in the middle of the picture."""
+    height = 0.01
     shining = stage.material("ShaderNodeEmission", Strength=100.0)
     stage.mesh([(-1, 0, 1), (1, 0, 1), (1, 0, 1 - height), (-1, 0, 1 - height)], [(0, 1, 2, 3)], material=shining)
     stage.mesh([(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
     stage.rectangle((-1, -1), (1, 1), material=mirror(stage))
     camera = stage.camera((0, 0, 0.5), (0, 0, 0))
-    camera.data.type, camera.data.ortho_scale = "ORTHO", 2 * half
-    found = [stage.render(1, (12, 12), seed, bounces=1)["glossy_indirect"][..., :3].mean() for seed in range(1, 9)]
-    expected = 100 * (half + height - np.hypot(half, height)) / (2 * half)
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.2
+    found = [stage.render(1, (12, 12), seed, bounces=1)["glossy_indirect"][5:7, :, :3].mean() for seed in range(1, 7)]
+    expected = 50 * (1 - 1 / np.hypot(1, height * 120))
     print(f"{np.mean(found):.3f}, closed form {expected:.3f}")
-    assert np.mean(found) == pytest.approx(expected, rel=0.12)
+    assert np.mean(found) == pytest.approx(expected, rel=0.2)
