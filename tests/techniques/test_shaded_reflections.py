@@ -411,8 +411,8 @@ def test_one_sample_mirrors_faintly(stage):
 
 
 def test_a_mirror_shows_a_board_where_a_thin_lamp_touches_it(stage):
-    """Points of light stand for more than the sheet is high. Beside a long sheet of height c a board has at the distance y
-    the irradiance  pi L (1 - y / sqrt(y^2 + c^2)) / 2. Points alone brought .23 of it in the middle of the picture."""
+    """Points of light stand for more than the sheet is high. Beside a long sheet of height c a board has, at the distance
+    y, the irradiance  pi L (1 - y / sqrt(y^2 + c^2)) / 2. Points alone brought .23 of it in the picture's middle."""
     height = 0.01
     shining = stage.material("ShaderNodeEmission", Strength=100.0)
     stage.mesh([(-1, 0, 1), (1, 0, 1), (1, 0, 1 - height), (-1, 0, 1 - height)], [(0, 1, 2, 3)], material=shining)
