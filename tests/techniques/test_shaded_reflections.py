@@ -411,7 +411,7 @@ def test_one_sample_mirrors_faintly(stage):
 
 
 def test_a_mirror_shows_a_board_where_a_thin_lamp_touches_it(stage):
-    """Points of light stand for more than the sheet is high. Beside a long sheet of height c a board has, at the distance
+    """Points of light stand for more than the sheet is high. Beside a long sheet of height c a board has, at a distance
     y, the irradiance  pi L (1 - y / sqrt(y^2 + c^2)) / 2. Points alone brought .23 of it in the picture's middle."""
     height = 0.01
     shining = stage.material("ShaderNodeEmission", Strength=100.0)
