@@ -1,4 +1,4 @@
-// Colour of all that is diffuse, and of which kind the lobe in it is (w; 0: there is none).
+// Colour of all that is diffuse, and of which kind the lobe in it is (w; 0: there is none, -1: of a fibre).
 #include "lib/gbuffer.glsl"
 
 void main()
@@ -9,6 +9,7 @@ void main()
   if (position.w != 0.0) {
     Surface s = surface_decode(position, surface_normal_fetch(pixel), surface_diffuse_fetch(pixel),
                                surface_tint_fetch(pixel), surface_lobe_fetch(pixel), vec4(0.0));
-    out_color = vec4(diffuse_color(s), has_diffuse_lobe(s) ? float(s.kind) : 0.0);
+    bool fibre = s.kind == LOBE_TOON && s.glossy_tint.z < 0.9;  // as soft_lobe_begin tells
+    out_color = vec4(diffuse_color(s), has_diffuse_lobe(s) ? (fibre ? -1.0 : float(s.kind)) : 0.0);
   }
 }

@@ -23,6 +23,11 @@ void run(ivec2 pixel)
   if (centre.w == 0.0) {
     return;  // sums hold samples that met a surface here where the last one met none
   }
+#ifdef LOBES
+  if (surface_diffuse_fetch(pixel).w < 0.0) {
+    return;  // of hair each strand is a surface of its own: the mean of those that differ little would be dark
+  }
+#endif
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).xy);
   float pixel_size = pixel_size_at(centre.xyz);
   vec4 on_surface = vec4(0.0);
