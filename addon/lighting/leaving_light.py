@@ -2,15 +2,15 @@
 
 In samples in which somebody asks, walks from points of the mesh (scene/scatter_points.py) find what leaves there of
 the direct light of all points: from all of them in the first such samples, later from every `stride`-th row in turn.
-Their mean over the samples so far and over points around, within some .7 of a free path, stands with a grid of voxels
-around each object in one list, an image, so that rays find it where they meet a surface
+Their mean over the walks so far and over points around, within some .7 of a free path, of colours 2.5 times that,
+stands with a grid of voxels around each object in one list, an image, so that rays find it where they meet a surface
 (shaders/subsurface/leaving.glsl), in place of what a diffuse surface would send. The list is written anew when the
 number of samples has doubled, or grown by RENEWED. Of indirect light they send on what leaves on the side where it came
 from.
 
 | cost | per sample |
 |---|---|
-| rays | a point: `walks` / `stride` times about 2 / (1 - albedo)^(1/2) + 2 |
+| rays | a point: 1 / `stride`, at first WALKS, times about 2 / (1 - albedo)^(1/2) + 2 |
 | passes | 1, and 1 where the list is written |
 | bytes | 176 a point, up to 32 for each of 64^3 voxels an instance |
 
@@ -36,7 +36,7 @@ from ..scene.scatter_points import RANGE, ROW, ScatterPoints
 from ..scene.view import VIEW
 from ..surfaces.hits import Hits
 
-WALKS = 4  # of a point in a picture of one sample: their light arrives from many points
+WALKS = 4  # of a point in a picture's first sample, 1 in later ones: the list of early samples is shown most often
 WHOLE = 8  # times first that all points have walks
 RENEWED = 16  # samples after which the list is written anew, at most
 WIDTH, CELL_TEXELS, FIRST_CELL = images.LIST_WIDTH, 5, images.LIST_WIDTH
@@ -54,8 +54,8 @@ LEAVING = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"),),
     constants=(
-        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "stride"), ("INT", "draw_number"),
-        ("INT", "in_glass"),
+        ("INT", "first_object"), ("INT", "first_leaf"), ("INT", "walks"), ("INT", "first_walk"), ("INT", "stride"),
+        ("INT", "draw_number"), ("INT", "in_glass"),
         ("FLOAT", "offset_size"),
     ),
     defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
@@ -76,7 +76,7 @@ LIST = passes.fullscreen_program(
             "scatter_means",
         )
     ),
-    constants=(("INT", "first_object"), ("INT", "walks")),
+    constants=(("INT", "first_object"),),
     outputs=(("VEC4", "out_texel"),),
 )
 PROGRAMS = (LEAVING, LIST)
@@ -93,7 +93,7 @@ class LeavingService(Service):
 def stride_of(drawn: int) -> int:
     """Of how many rows of points one has walks, where this was `drawn` so often before: all of them at first, of 64
     times an eighth. It goes by what was drawn: how many samples follow may be unknown. After N times points have about
-    2 N^(1/2) walks, from 8 on; all rows have two turns and more before the stride grows."""
+    2 N^(1/2) walks, from 8 on, and WALKS - 1 more; all rows have two turns and more before the stride grows."""
     return 1 if drawn < WHOLE else int(drawn**0.5)
 
 
@@ -113,7 +113,7 @@ class LeavingLight:
         self.image: images.Image | None = None
         self._rows = 0  # of the image, that points take
         self._sums: images.Target | None = None  # of LEFT, over the samples so far
-        self._drawn = 0  # samples in these
+        self._drawn = self._walked = 0  # samples in these, walks of a point in which none is passed over
 
     def begin(self) -> None:
         """A picture begins."""
@@ -137,7 +137,7 @@ class LeavingLight:
         hierarchy, settings = frame.hierarchy("shadow"), frame.settings
         owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
         position, normal = points.surface(frame.sample)
-        walks = 1 if settings.schedule.is_draft else max(WALKS // settings.samples, 1)
+        walks = WALKS if self._drawn == 0 and not settings.schedule.is_draft else 1
         if self._sums is None:
             self._sums = images.Target(tuple(images.pool.take(ROW, points.rows, "RGBA32F") for _ in LEFT))
             self._sums.clear()
@@ -152,10 +152,11 @@ class LeavingLight:
             constants={
                 "first_object": points.first_object, "first_leaf": first_leaf, "offset_size": frame.offset_size,
                 "in_glass": int(coated),
-                "walks": walks, "stride": stride_of(self._drawn), "draw_number": self._drawn,
+                "walks": walks, "first_walk": self._walked,
+                "stride": stride_of(self._drawn), "draw_number": self._drawn,
             },
         )  # fmt: skip
-        self._drawn += 1
+        self._drawn, self._walked = self._drawn + 1, self._walked + walks
         if self._drawn % RENEWED and self._drawn & (self._drawn - 1):
             return 1
         passes.fullscreen(
@@ -165,7 +166,7 @@ class LeavingLight:
                 "point_normal": normal, "point_instances": points.instances, "scatter_objects": points.table,
                 "scatter_means": textures["scatter_means"], "cells": points.cells[frame.sample % len(points.cells)],
             },
-            constants={"first_object": points.first_object, "walks": walks},
+            constants={"first_object": points.first_object},
         )  # fmt: skip
         return 2
 
@@ -173,7 +174,7 @@ class LeavingLight:
         if self._sums is not None:
             for image in self._sums.colors:
                 images.pool.give(image)
-        self._sums, self._drawn = None, 0
+        self._sums, self._drawn, self._walked = None, 0, 0
 
     def release(self) -> None:
         """Drop GPU resources."""

@@ -1,10 +1,11 @@
 // What light below the surface leaves objects at their points, for whoever sees them but the camera (lighting/leaving_light.py): by
-// walks from each point, entered from directions of the cosine's density. For albedo 1, added over the samples of a picture:
+// walks from each point, entered from directions of the cosine's density. For albedo 1, added over the walks of a picture:
 //
 //   sent  radiance, of the direct light of points, mean over directions; w: sum of the squares of its luminance over single walks
 //   slope by how much more the normal's direction gets than the surface's: the line fitted to the walks by the cosine; w: above 0
 //         in glass
-//   same  of light that arrives evenly at the side on which the point lies, how much leaves there again; w: samples
+//   same  of light that arrives evenly at the side on which the point lies, how much leaves there again; w: walks, or
+//         samples where none are walked
 //   red, green, blue  lean along the surface, by how much more the direction towards it gets, of each channel; w: part, the share
 //         of the diffuse albedo that scatters and that walks find; the rest is as a diffuse surface
 #include "lib/gbuffer.glsl"
@@ -91,7 +92,7 @@ void main()
   mat3 aslant = mat3(0.0);
   float squares = 0.0;
   for (int walk = 0; walk < walks; walk++) {
-    Even even = even_of(texel, film_view.sample_index * walks + walk, 241);
+    Even even = even_of(texel, first_walk + walk, 241);
     uvec2 salt = hash3(even.more).xy;
     vec2 v = vec2(shuffled(even.index, even.more.xy), shuffled(even.index, salt));
     vec3 view = cosine_direction(entered_normal, v);
@@ -102,25 +103,25 @@ void main()
     }
     float cosine = dot(view, entered_normal);
     vec3 brought = sent_so_far - before;
-    float alone = luminance(brought / max(color.rgb, vec3(1e-3))) / float(walks);
+    float alone = luminance(brought / max(color.rgb, vec3(1e-3)));
     squares += alone * alone;
     by_cosine += (cosine - 2.0 / 3.0) * brought;
     aslant += outerProduct(view - cosine * entered_normal, brought);
   }
   rest *= walk_rest(color.rgb);
-  vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / (max(color.rgb, vec3(1e-3)) * float(walks));
+  vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / max(color.rgb, vec3(1e-3));
   // In glass the rest is sent as by a diffuse surface, too.
   float rests = coat.w * (1.0 - part);
   part += rests;
   rests /= part;
-  vec3 diffuse = min(shape.w, 1.0) * cell_direct_fetch(texel).rgb;
+  vec3 diffuse = float(walks) * min(shape.w, 1.0) * cell_direct_fetch(texel).rgb;
   out_sent = vec4(mix(sent_so_far * norm, diffuse, rests), squares);
   // One over the variance of the cosine, and of either component along the surface.
   norm *= 1.0 - rests;
   out_slope = vec4(18.0 * by_cosine * norm, coat.w);
-  vec3 found = part * share.rgb;
+  vec3 found = float(walks) * part * share.rgb;
   out_red = vec4(4.0 * norm.r * aslant[0], found.r);
   out_green = vec4(4.0 * norm.g * aslant[1], found.g);
   out_blue = vec4(4.0 * norm.b * aslant[2], found.b);
-  out_same = vec4((same_so_far * norm + vec3(rests)) * coat.rgb, 1.0);
+  out_same = vec4((same_so_far * norm + float(walks) * vec3(rests)) * coat.rgb, float(walks));
 }

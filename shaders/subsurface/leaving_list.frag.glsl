@@ -3,7 +3,8 @@
 // that; the place, w: above 0 in glass; how each channel leans, as a share of the mean.
 //
 // Mean and same are also means over points around, since walks of one point are few, and rays that look from a mirror or through
-// glass see the same points in every sample: what those err by would show as blotches of single channels.
+// glass see the same points in every sample: what those err by would show as blotches. A walk is of one channel more than of others,
+// so that colours err by more than brightness does, and eyes see their blotches first: colours are of wider means.
 #include "lib/gbuffer.glsl"
 #include "subsurface/image.glsl"
 #include "subsurface/lean.glsl"
@@ -14,6 +15,8 @@
 #define SPACINGS 1.0    // distances between points at least: standard deviation of the means' weights, of few walks
 #define FEW_WALKS 8.0   // above these less, by the fourth root of their number (as of pixels, subsurface/smooth.frag.glsl)
 #define FARTHEST 2.5    // standard deviations
+#define COLORS 2.5      // times as wide are means of colours, up to
+#define COLORS_FARTHEST 1.5  // of their standard deviations
 
 vec4 object_texel(int index)
 {
@@ -23,6 +26,13 @@ vec4 object_texel(int index)
 float alike_facing(vec3 facing, vec3 normal)
 {
   return smoothstep(ALIKE, 0.5 + 0.5 * ALIKE, dot(facing, normal));
+}
+
+// As bright as `narrow`, of the colour of `wide`.
+vec3 recolored(vec3 narrow, vec3 wide)
+{
+  float bright = luminance(wide);
+  return (bright > 0.0) ? luminance(narrow) / bright * wide : narrow;
 }
 
 // What leaves a point of direct light, and in `same` how much of what arrives evenly on its side: means over points of the object around.
@@ -41,36 +51,47 @@ vec3 sent_around(ivec2 texel, out vec3 same)
   vec4 object = object_texel(first_object + OBJECT_TEXELS * int(belongs.x + 0.5));
   vec3 place = point_position_fetch(texel).xyz;
   vec3 normal = octahedral_decode(point_normal_fetch(texel).xy);
-  float many = sqrt(sqrt(max(own.w * float(walks) / FEW_WALKS, 1.0)));
+  float many = sqrt(sqrt(max(own.w / FEW_WALKS, 1.0)));
   vec3 wide = max(PATHS * length_m.xyz / many, vec3(SPACINGS * object.z / many));
   vec3 narrower = vec3(0.5) / (wide * wide);
   float reach = FARTHEST * max_component(wide);
+  float colors_reach = COLORS * COLORS_FARTHEST * max_component(wide);
   vec3 sums = vec3(0.0);
   vec3 whole = vec3(0.0);
+  vec3 sums_of_colors = vec3(0.0);
+  vec3 whole_of_colors = vec3(0.0);
+  vec3 same_of_colors = vec3(0.0);
   same = vec3(0.0);
   int first = int(object.x + 0.5);
   for (int row = first; row < first + int(object.y + 0.5); row++) {
     vec4 bound = cells_fetch(ivec2(ROW, row));
-    if (distance(bound.xyz, place) > bound.w + reach) {
+    if (distance(bound.xyz, place) > bound.w + colors_reach) {
       continue;
     }
     for (int x = 0; x < ROW; x++) {
       ivec2 other = ivec2(x, row);
       vec3 path = point_position_fetch(other).xyz - place;
       float squared = dot(path, path);
-      if (squared < reach * reach) {
+      if (squared < colors_reach * colors_reach) {
         vec3 facing = octahedral_decode(point_normal_fetch(other).xy);
         float alike = alike_facing(facing, normal) * step(abs(point_instances_fetch(other).w - belongs.w), 0.5);
-        vec3 weight = alike * exp(-squared * narrower);
         vec4 found = cell_same_fetch(other);
-        sums += weight * cell_sent_fetch(other).rgb;
+        vec3 leaves = cell_sent_fetch(other).rgb;
+        vec3 weight = alike * exp(-squared / (COLORS * COLORS) * narrower);
+        sums_of_colors += weight * leaves;
+        same_of_colors += weight * found.rgb;
+        whole_of_colors += weight * found.w;
+        weight = (squared < reach * reach) ? alike * exp(-squared * narrower) : vec3(0.0);
+        sums += weight * leaves;
         same += weight * found.rgb;
         whole += weight * found.w;
       }
     }
   }
-  same /= max(whole, vec3(1e-20));
-  return sums / max(whole, vec3(1e-20));
+  whole = max(whole, vec3(1e-20));
+  whole_of_colors = max(whole_of_colors, vec3(1e-20));
+  same = recolored(same / whole, same_of_colors / whole_of_colors);
+  return recolored(sums / whole, sums_of_colors / whole_of_colors);
 }
 
 // How what leaves depends on the direction, as a share of the mean: sums over points that face alike by sums, since a single walk that

@@ -15,7 +15,7 @@ from addon.techniques import image_space_subsurface, make_registry
 from addon.techniques.image_space_subsurface import ImageSpaceSubsurface
 from addon.ui.properties import settings_of
 from tests.techniques.foggy_stage import box, volume
-from tests.techniques.test_image_space_subsurface import WALK, scattering, shown, sphere
+from tests.techniques.test_image_space_subsurface import PATH, WALK, scattering, shown, sphere
 
 
 def test_light_that_comes_through_a_slab_reaches_the_floor_below(stage):
@@ -183,10 +183,10 @@ def test_milk_that_touches_its_glass_has_the_light_that_the_glass_mirrors_back(s
     assert seen == pytest.approx(expected, rel=0.035)
 
 
-def test_lamps_light_milk_in_a_glass_cylinder_as_its_glass_bends_their_light(stage):
-    """The side of milk that faces a sun. It had 1.20 of Cycles' light while each straight ray brought what even light
-    brings in the mean: what the glass mirrors back still enters where it left, in truth 20 to 50 degrees away."""
-    milk = scattering(stage, "BURLEY", 1.5, radius=(1, 0.9, 0.7), color=(0.95, 0.93, 0.88))
+def milk_in_cylinder(stage, method):
+    """A cylinder of milk in solid glass under a sun, and a camera that sees the middle of its side."""
+    scale = 1.5 * (1.0 if method == "BURLEY" else PATH * WALK)
+    milk = scattering(stage, method, scale, radius=(1, 0.9, 0.7), color=(0.95, 0.93, 0.88))
     glass = stage.principled(Base_Color=(1, 1, 1, 1), Transmission_Weight=1, Roughness=0, IOR=1.45)
     for material, radius, depth, middle in ((glass, 0.7, 1.8, 0.0), (milk, 0.6, 1.3, -0.1)):
         bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=radius, depth=depth, location=(0, 0, middle))
@@ -195,7 +195,26 @@ def test_lamps_light_milk_in_a_glass_cylinder_as_its_glass_bends_their_light(sta
         for polygon in made.data.polygons:
             polygon.use_smooth = len(polygon.vertices) == 4
     stage.light("SUN", turn=(0.9, 0, 0.6), energy=np.pi, angle=0.5)
-    stage.camera((0, -4.5, 0), (np.pi / 2, 0, 0), 0.1)
+    return stage.camera((0, -4.5, 0), (np.pi / 2, 0, 0), 0.1)
+
+
+def test_milk_in_glass_has_no_coloured_blotches(stage):
+    """Random Walk in four samples: the ratio of red to blue, as a share of its mean. Of points around that brightness
+    is the mean of, with a walk of each in each sample, it spread by .145; denoised Cycles 5.2 has 0.02."""
+    milk_in_cylinder(stage, "RANDOM_WALK").data.angle = 0.2
+    spreads = []
+    for seed in range(2):
+        seen = shown(stage.render(4, size=(24, 18), bounces=16, seed=seed))
+        ratio = seen[..., 0] / seen[..., 2]
+        spreads.append(ratio.std() / ratio.mean())
+    print(f"spreads {np.round(spreads, 3)}")
+    assert np.mean(spreads) < 0.08
+
+
+def test_lamps_light_milk_in_a_glass_cylinder_as_its_glass_bends_their_light(stage):
+    """The side of milk that faces a sun. It had 1.20 of Cycles' light while each straight ray brought what even light
+    brings in the mean: what the glass mirrors back still enters where it left, in truth 20 to 50 degrees away."""
+    milk_in_cylinder(stage, "BURLEY")
     seen = shown(stage.render(32, size=(12, 9), bounces=16)).mean(axis=(0, 1))
     print(f"seen {seen.round(4)}")
 
