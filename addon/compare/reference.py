@@ -5,8 +5,8 @@ The only module of this package that knows bpy.
 The render runs through `bpy.ops.render.render`, the way a user starts it, and its passes are read from a 32-bit
 multilayer EXR. Settings are changed for the time of the render and put back afterwards, whatever happens.
 
-What makes Cycles a reference here: no clamping, caustics on, no blurred gloss, no light threshold, no adaptive
-sampling, no denoising, no fast GI, bounces far beyond what still adds light, a fixed seed. The pixel filter is
+What makes Cycles a reference here: no clamping, caustics as the scene says, no blurred gloss, no light threshold, no
+adaptive sampling, no denoising, no fast GI, bounces far beyond what still adds light, a fixed seed. The pixel filter is
 Blackman-Harris with the width of the scene's own filter size, so that both engines reconstruct alike.
 
 A reference is kept on disk under a hash of what was rendered. `bpy.data.is_dirty` cannot tell whether the open file

@@ -403,8 +403,8 @@ def _notes(data: Comparison) -> str:
 def _reference_note(data: Comparison) -> str:
     text = (
         f"The reference is the mean of two renders by {data.reference_engine}, {data.reference_samples} samples each, "
-        "with different seeds, no clamping, denoising or adaptive sampling, caustics on; half their difference is "
-        "the noise floor."
+        "with different seeds, no clamping, denoising or adaptive sampling, caustics as the scene says; half their "
+        "difference is the noise floor."
     )
     if data.direct_only:
         text += " It was rendered without bounces: Combined shows direct light, emission and world."
