@@ -368,6 +368,39 @@ def test_paths_leave_by_the_lobe_with_its_energy_and_never_far_too_bright(gpu_co
     assert found[:, 1].max() < 1.5 < 30.0 < found[:, 2].max()
 
 
+def test_paths_through_strands_leave_ahead_and_never_far_too_bright(gpu_context):
+    """Behind a strand that light shines through: the mean of what is drawn is the integral over directions, at every
+    slant of the view, and no weight is twice as large as all that arrives, where the cosine's own density makes 4.5."""
+    n = 9.0
+    before = f"""Reflection r; r.diffuse = vec3(1.0); r.through = vec3(1.0); r.rough = -0.01;
+  r.straight = vec3(0.0); r.grazing = vec3(0.0); r.alpha = {n};
+  float slant = 0.02 + 0.98 * k; vec3 normal = vec3(0.0, 0.6, 0.8);
+  vec3 viewer = sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0) - slant * normal;
+  float sum = 0.0; float most = 0.0; float blunt = 0.0;
+  for (int i = 0; i < 64 * 64; i++) {{
+    vec2 u = (vec2(i % 64, i / 64) + 0.5) / 64.0; vec3 weight;
+    reflection_sample(r, normal, viewer, u, weight);
+    sum += weight.x / (64.0 * 64.0); most = max(most, weight.x);
+    blunt = max(blunt, PI * reflection_of(r, normal, cosine_direction(normal, u), viewer).x);
+  }}"""
+    found = evaluated(
+        "lib/gbuffer.glsl lib/brdf.glsl indirect/albedo.glsl",
+        "vec4(sum, most, blunt, 0.0)",
+        before=before,
+        **with_table(),
+    )
+    slant = 0.02 + 0.98 * np.arange(64) / 63
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    high = (nodes[:, None] + 1) / 2
+    turn = np.pi * np.arange(0.5, 400) / 400
+    aside = np.sqrt(1 - high**2)
+    for k in (0, 5, 20, 63):
+        ahead = slant[k] * high - np.sqrt(1 - min(slant[k], 1.0) ** 2) * aside * np.cos(turn)
+        scattered = (1 + 0.39 * n) * (0.5 + 0.5 * ahead) ** n * high
+        np.testing.assert_allclose(found[k, 0], (scattered.mean(axis=1) * weights).sum(), rtol=0.01)
+    assert found[:, 1].max() < 2.0 < 4.4 < found[:, 2].max()
+
+
 def test_a_map_of_half_the_side_has_the_nearest_of_four_planes_where_most_lie_alike(gpu_context):
     """A map of parallel rays: planes across them at these distances, in blocks of four texels."""
 
