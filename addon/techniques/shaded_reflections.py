@@ -16,7 +16,7 @@ surfaces of glass behind it, of which one is chosen that mirrors. Of other lobes
 | cost | per sample and bounce |
 |---|---|
 | rays | 1 per pixel that still has one, 1 to lights, 2 to 4 for light of other surfaces |
-| passes | 5, and 1 for each program of materials (masked by depth); none once no ray is left |
+| passes | 5, and 1 for each program of materials (masked by depth), also where no ray is left |
 | samples | as many as its share of the picture asks for, each bounce by itself (frame/shares.py); all, through glass |
 | bytes per pixel | 258 while it runs, of the pool |
 
@@ -45,7 +45,6 @@ from ..frame.shares import Turns
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..kernels import reduction
 from ..lighting import caustic_maps, linked
 from ..lighting.asked import lit_at_hits
 from ..lighting.caustic_casters import Answered, bright_world, meshes_answered
@@ -195,14 +194,6 @@ def received_program(kinds: int, transmission: bool, soft_lobes: bool, bounced: 
     )  # fmt: skip
 
 
-RAYS_LEFT = reduction.ReductionSource(
-    "rays left",
-    "vec4 reduction_source(ivec2 texel)\n{\n"
-    "  return vec4(vec3(0.0), any(notEqual(ray_direction_fetch(texel).xyz, vec3(0.0))) ? 1.0 : 0.0);\n}\n",
-    textures=(("RGBA32F", "ray_direction"),),
-)  # fmt: skip
-
-
 @cache
 def guide_program(transmission: bool) -> Program:
     return passes.fullscreen_program(
@@ -224,7 +215,7 @@ PROGRAMS = (
         for bounced in (False, True)
     ),
 )
-DECLARED = guide_program(False), guide_program(True), reduction.block_program(RAYS_LEFT)
+DECLARED = guide_program(False), guide_program(True)
 
 
 class ShadedReflections(Technique, BothWays):
@@ -269,7 +260,6 @@ class ShadedReflections(Technique, BothWays):
         self._turns = [Turns(self, MOST_PARTS) for _ in range(3)]  # of the ways of glass (hits/scatter.frag.glsl)
         self._any_ray = True  # whether some lobe has rays
         self._onward = True  # whether rays may go on from what they meet
-        self._ends: dict[int, int] = {}  # by way of glass, the round from which on it is asked whether rays are left
         self._guides: tuple[str, ...] = (SHOWN,)
         self._into: dict[str, images.Image] = {}  # what this bounce adds to, by name
         self._rows: list[np.ndarray] = []  # lights of this sample
@@ -306,7 +296,6 @@ class ShadedReflections(Technique, BothWays):
             for rays, least in (("1 bounce", ONWARD_ROUGHNESS), ("none", limit)):
                 if smoothest > least:
                     frame.account.chose(self, "rays", f"{rays}, because no material is smoother than {least:g}")
-        self._ends = {}
         self._guides = tuple(name for name in (SHOWN, SHOWN_THROUGH) if name in frame.images)
         guide = self._guides if frame.settings.samples > 1 else ()
         # Which surface behind glass mirrors is chance: a bounce that one sample shows nothing of may bring most.
@@ -426,8 +415,6 @@ class ShadedReflections(Technique, BothWays):
                     self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, ONWARD, before, way)
                     closures.colors[LOBE].beside = {}
                     rays, onward = onward, rays
-                    if self._have_ended(frame, rays, way, number + 1):
-                        break
 
         try:
             for place in range(places):
@@ -441,19 +428,6 @@ class ShadedReflections(Technique, BothWays):
             records.give()
             maps.done()
         frame.count(self, "light samples", len(rows))
-
-    def _have_ended(self, frame: Frame, rays: images.Target, way: int, number: int) -> bool:
-        """Whether no ray of this way is left for round `number`: in most scenes the last ones leave long before the
-        last round, each of which is some ten passes. To ask waits for the GPU, and is done from the round on at which
-        the way's rays were found to end before."""
-        if number < self._ends.get(way, 1):
-            return False
-        with images.borrowed(1, 1, "RGBA32F") as left:
-            count = reduction.reduce(RAYS_LEFT, rays.size, left, {"ray_direction": rays.colors[1]})
-            found = images.read(left.colors[0])[0, 0, 3] > 0.0
-        frame.count(self, "passes", count)
-        self._ends[way] = number + bool(found)
-        return not found
 
     @staticmethod
     def _places(frame: Frame) -> int:
