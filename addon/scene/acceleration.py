@@ -23,7 +23,7 @@ Bias: none. Above LARGEST triangles that would have to be kept there is no hiera
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +39,7 @@ from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
 from .on_gpu import SceneOnGpu
 from .traced_triangles import (
     ALL_RAYS,
+    NO_RECORDS,
     STAINED,
     TINT_CODE,
     absorption_records,
@@ -186,16 +187,21 @@ class Trees:
     tree, what is below either, the trees of meshes, records of instances.
     """
 
-    def __init__(self, world: Tree, tiles: np.ndarray = NO_TILES, copies: Sequence[Copies] = (), origin=(0, 0, 0)):
-        """`tiles`: texels of OpacityMaps that opacity codes tell of, and records of what absorbs (absorption_records);
-        `origin`: what places are relative to."""
+    def __init__(
+        self, world: Tree, tiles: np.ndarray = NO_TILES, copies: Sequence[Copies] = (), origin=(0, 0, 0),
+        absorption: np.ndarray = NO_TILES, absorbing: Mapping[int, int] = NO_RECORDS,
+    ):  # fmt: skip
+        """`tiles`: texels of OpacityMaps that opacity codes tell of; `origin`: what places are relative to;
+        `absorption`, `absorbing`: the two of absorption_records, which looks of triangles tell of."""
         self.world, self.moved = world, False
         self.asked: tuple[Instance, ...] | None = None  # instances of the last snapshot that was asked for these
-        tiles = np.pad(tiles, ((0, -len(tiles) % LEAF_TEXELS), (0, 0)))
-        self._first_leaf = len(tiles) // LEAF_TEXELS
+        self.absorbing = absorbing
+        told = np.concatenate([tiles, absorption])
+        told = np.pad(told, ((0, -len(told) % LEAF_TEXELS), (0, 0)))
+        self._first_leaf = len(told) // LEAF_TEXELS
         own = [world, *(one.tree for one in copies)]
         starts = self._first_leaf + np.cumsum([0, *(len(tree.leaves) for tree in own)])
-        texels = [tiles] * bool(len(tiles)) + [tree.leaves.reshape(-1, 4) for tree in own]
+        texels = [told] * bool(len(told)) + [tree.leaves.reshape(-1, 4) for tree in own]
         leaves = images.upload_list(np.concatenate(texels) if len(texels) > 1 else texels[0])
         leaves.defines = (TILED if len(tiles) else ()) + (INSTANCED if len(copies) else ())
         leaves.defines += TINTED if any((tree.leaves[:, EMISSION_TEXEL] <= -TINT_CODE).any() for tree in own) else ()
@@ -357,20 +363,20 @@ class HierarchyCache:
             # What opacity and emission tell apart between instances would be too many trees: all have the first one's.
             expanded, kinds = parted(some, meshes, lambda one: (one.mesh, one.materials, *met(one)), LARGEST)
         number = {id(one): k for k, one in enumerate(shown)} if kinds else {}
-        texels, records = absorption_records(materials, maps)
+        absorption, absorbing = absorption_records(materials, some, maps)
         copies, used = [], {}
         for kind, own in kinds.items():
             first = some[own[0]]
             slots = {*first.materials, 0}  # faces without a material have the first one
             slots = [slot for slot in sorted(slots) if slot < len(self._looks[1])]
-            looks = tuple((self._looks[1][slot], records.get(slot)) for slot in slots)
+            looks = tuple((self._looks[1][slot], absorbing.get(slot)) for slot in slots)
             named = (kind, meshes[first.mesh].version, looks, *rest[3:5])
-            tree = used[named] = self._meshes.get(named) or _tree_of_mesh(first, look)
+            tree = used[named] = self._meshes.get(named) or _tree_of_mesh(first, look, absorbing)
             if tree.triangles:
                 own = [some[k] for k in own]
                 copies.append(Copies(tree, own, [number[id(one)] for one in own], *tree.boxes.around(MOST_BOXES)))
-        world = Tree(*world_triangles(expanded, meshes, materials, origin, path, maps, glow, sheets))
-        trees = Trees(world, np.concatenate([maps.texels, texels]), copies, origin)
+        world = Tree(*world_triangles(expanded, meshes, materials, origin, path, maps, glow, sheets, absorbing))
+        trees = Trees(world, maps.texels, copies, origin, absorption, absorbing)
         trees.hierarchy = replace(trees.hierarchy, instances=shown, expanded=tuple(expanded))
         self._meshes = dict([*self._meshes.items()][-MOST_MESHES:]) | used
         return trees
@@ -402,7 +408,9 @@ class HierarchyCache:
                 continue
             starts = np.cumsum(counts) - counts
             triangles = [np.arange(starts[k], starts[k] + counts[k]) for k in numbers]
-            corners = world_triangles([shown[k] for k in expanded], meshes, materials, origin, path, maps, glow, sheets)
+            corners = world_triangles(
+                [shown[k] for k in expanded], meshes, materials, origin, path, maps, glow, sheets, trees.absorbing
+            )
             del self._kept[other]
             if not trees.move(np.concatenate([*triangles, np.zeros(0, np.int64)]), corners, copies):
                 return None
@@ -422,12 +430,12 @@ def _looks(instance: Instance) -> tuple:
     return instance.mesh, instance.materials, links_code(instance)
 
 
-def _tree_of_mesh(instance: Instance, look: tuple) -> Tree:
+def _tree_of_mesh(instance: Instance, look: tuple, absorbing: Mapping[int, int]) -> Tree:
     """The tree of a mesh in its own space, as an instance shows it."""
     meshes, materials, path, maps, glow, sheets = look
     resting = replace(instance, matrix=np.eye(4))
     own = {id(resting): sheets[id(instance)]} if id(instance) in sheets else NO_SHEETS
-    tree = Tree(*world_triangles([resting], meshes, materials, np.zeros(3), path, maps, glow, own))
+    tree = Tree(*world_triangles([resting], meshes, materials, np.zeros(3), path, maps, glow, own, absorbing))
     tree.low = tree.high = None  # it will not move
     return tree
 

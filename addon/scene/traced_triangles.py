@@ -9,7 +9,9 @@ Cost: numpy over all triangles of all instances, some 0.3 us each.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from itertools import groupby
+from types import MappingProxyType
 
 import numpy as np
 
@@ -30,6 +32,7 @@ TINT_CODE = 1000.0  # taken from minus the colour of what passes, in the place o
 # In the place of red: green names the tile whose colours these are, or is minus a colour (packed_tints); 0: that of the
 # record. Blue names the record of what the inside absorbs, negative where corners run the other way round, 0: nothing.
 STAINED = -2.0 * TINT_CODE
+NO_RECORDS: Mapping[int, int] = MappingProxyType({})
 RECORD = 2  # texels of such a record: what is absorbed, 1/m; mean colour of what passes a face, over the chance to pass
 # Above that number stand the groups of light linking, of receivers and of blockers, those beyond the last one as one:
 # all of it, and the quarter, is exact in one float.
@@ -47,12 +50,12 @@ def world_triangles(
     maps: OpacityMaps,
     glow: EmissionMaps,
     sheets: Sheets = NO_SHEETS,
+    absorbing: Mapping[int, int] = NO_RECORDS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) float32 opacity (_codes), mean emitted radiance, number of the
     material (with the side that emits, mean_emission) and packed corner normals. `sheets`: see
-    glass_sheets.py."""
-    absorbing = absorption_records(materials, maps)[1]
+    glass_sheets.py; `absorbing`: see absorption_records."""
     look = {
         (rays, mirrored): np.array([
             (mean_code(m, rays), *(_absorbing(absorbing[k], mirrored) if k in absorbing else radiance), k + side)
@@ -104,11 +107,14 @@ def world_triangles(
     return corners, looks
 
 
-def absorption_records(materials: list[CompiledMaterial], maps: OpacityMaps) -> tuple[np.ndarray, dict[int, int]]:
-    """Texels (N, 4) that follow those of OpacityMaps, for materials of glass whose inside absorbs; and where the record
-    of each such material begins among all texels."""
+def absorption_records(
+    materials: list[CompiledMaterial], shown: Iterable[Instance], maps: OpacityMaps
+) -> tuple[np.ndarray, dict[int, int]]:
+    """Texels (N, 4) that follow those of OpacityMaps, for materials of glass on `shown` whose inside absorbs; and where
+    the record of each such material begins among all texels."""
     first = max(len(maps.texels), 1)  # 0 is none
-    own = {k: m for k, m in enumerate(materials) if any(m.absorbed_inside) and not m.emissive}
+    used = {0}.union(*{one.materials for one in shown})  # faces without a material have the first one
+    own = {k: m for k, m in enumerate(materials) if k in used and any(m.absorbed_inside) and not m.emissive}
     texels = np.zeros((first - len(maps.texels) + RECORD * len(own) if own else 0, 4), np.float32)
     for row, material in zip(texels[first - len(maps.texels) :].reshape(-1, RECORD, 4), own.values()):
         row[0, :3], row[1, :3] = material.absorbed_inside, material.tint if material.tinted else 1.0
