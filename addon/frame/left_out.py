@@ -79,7 +79,8 @@ def _thrown_wide(
         evenly = plan.filled["indirect"] in EVEN
         spread = "evenly, as by dull surfaces" if evenly else "as by a roughness of 0.5"
         text = f"light that other surfaces get from the gloss of {told} is spread {spread}: lamps' reflections there"
-        yield Note("Gloss", f"{text} are softer. Metals of roughness 0.5 or less throw caustics.")
+        thrown = f" Metals of roughness {gloss.THROWS:g} or less throw caustics." if least else ""
+        yield Note("Gloss", f"{text} are softer.{thrown}")
 
 
 def _flat_fibres(plan: Plan, snapshot: Snapshot) -> Iterator[Note]:

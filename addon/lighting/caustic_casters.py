@@ -97,7 +97,7 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
             mirrors[number] = rough
     if not glass and not mirrors:
         if film.caustics_reflective and film.caustics_refractive:
-            return "no material is glass or a smooth mirror"
+            return f"no material is glass or metal of roughness {gloss.THROWS:g} or less"
         return "caustics are switched off in the scene's Light Paths, and no material is glass"
     shown = [
         one

@@ -137,6 +137,7 @@ def test_gloss_that_is_thrown_wider_than_it_is_is_named(monkeypatch, inputs, sai
     notes = left_out.notes_of(plan, scene, some, [material])
     assert bool(notes) == said and all("'Pan'" in note.text and note.subject == "Gloss" for note in notes)
     assert all("as by a roughness of 0.5" in note.text for note in notes)
+    assert all("of roughness 0.5 or less throw caustics" in note.text for note in notes)
     evenly, by_direction = (
         left_out.notes_of(replace(plan, filled=plan.filled | {"indirect": name}), scene, some, [material])
         for name in ("implicit_visibility", "micro_rendering")
@@ -159,4 +160,4 @@ def test_smooth_metal_is_named_where_nothing_throws_caustics(monkeypatch):
     scene = SimpleNamespace(camera=None, used_materials={0, 1, 2, 3}, materials=materials)
     plan = Plan((), (), {"indirect": "instant_radiosity"})
     (note,) = left_out.notes_of(plan, scene, SimpleNamespace(bounces=4), [one for one, _ in made])
-    assert "'Metal 0', 'Metal 1' and 2 other materials" in note.text
+    assert "'Metal 0', 'Metal 1' and 2 other materials" in note.text and "caustics" not in note.text
