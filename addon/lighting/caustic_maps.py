@@ -88,7 +88,7 @@ def at_hits_program(transmission: bool, soft: bool = False) -> Program:
 
 
 PROGRAMS = (INTO_MAP, KEEP, *(at_hits_program(transmission) for transmission in (False, True)))
-DECLARED = (at_hits_program(True, True),)
+DECLARED = tuple(at_hits_program(transmission, True) for transmission in (False, True))
 
 
 @dataclass

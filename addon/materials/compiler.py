@@ -344,6 +344,27 @@ def may_tint(graph: Graph) -> bool:
     )
 
 
+# Whose lobes are none of microfacets, beside what is diffuse (shaders/lib/soft_lobe.glsl).
+SOFT = (
+    "ShaderNodeBsdfSheen", "ShaderNodeBsdfTranslucent", "ShaderNodeBsdfHairPrincipled", "ShaderNodeBsdfToon",
+)  # fmt: skip
+
+
+def may_be_soft(graph: Graph) -> bool:
+    """Whether some node of the graph can have a lobe of soft_lobe.glsl: cheap, by its sockets alone."""
+    return any(
+        node.type in SOFT
+        or (
+            node.type == "ShaderNodeBsdfPrincipled"
+            and (
+                _not_black(node.inputs.get("Sheen Weight"))
+                or (_may_be_thin(node.inputs.get("Thin Wall")) and _not_black(node.inputs.get("Subsurface Weight")))
+            )
+        )
+        for node in graph.nodes.values()
+    )
+
+
 REFLECTING = ("ShaderNodeSubsurfaceScattering", "ShaderNodeEeveeSpecular")  # beside those named Bsdf
 REFRACTING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
@@ -364,6 +385,10 @@ def may_refract(graph: Graph) -> bool:
 def _is_thin(socket) -> bool:
     """Whether a Principled BSDF is a thin wall for certain, from where shader_principled takes it for one."""
     return socket is not None and socket.link is None and float(socket.value) > THIN
+
+
+def _may_be_thin(socket) -> bool:
+    return socket is not None and (socket.link is not None or float(socket.value) > THIN)
 
 
 def least_roughness(graph: Graph) -> float:

@@ -48,6 +48,7 @@ from ..lighting.light_views import REFLECTED, REFRACTED
 from ..lighting.path_sources import ShadedLobes
 from ..lighting.photons import PHOTONS, SPREAD_SIDE, WALLED, LitView, Photons
 from ..materials import gloss
+from ..materials.compiler import may_be_soft
 from ..scene import acceleration
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
@@ -71,7 +72,7 @@ def splat_program(gloss: bool, soft: bool) -> Program:
     )
 
 
-DECLARED = splat_program(False, False), splat_program(True, False), splat_program(True, True)
+DECLARED = tuple(splat_program(gloss, soft) for gloss in (False, True) for soft in (False, True))
 LIGHT, GLOSS = "radiance.diffuse_indirect", "radiance.glossy_indirect"
 LEAST_PIXELS = 0.92
 MAPS_APART = 4  # samples for which rays ask the same map: it costs as much as the picture's photons, and shows less
@@ -120,7 +121,8 @@ class ScreenSpacePhotons(Technique):
         return True
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return PHOTONS, WALLED, splat_program(_on_gloss(snapshot, caustic_casters.casters_of(snapshot)), False)
+        soft = any(may_be_soft(snapshot.materials[slot].graph) for slot in snapshot.used_materials)
+        return PHOTONS, WALLED, splat_program(_on_gloss(snapshot, caustic_casters.casters_of(snapshot)), soft)
 
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)

@@ -5,7 +5,14 @@ import time
 import numpy as np
 import pytest
 
-from addon.materials.compiler import compile_material, default_graph, may_mirror, may_refract, may_tint
+from addon.materials.compiler import (
+    compile_material,
+    default_graph,
+    may_be_soft,
+    may_mirror,
+    may_refract,
+    may_tint,
+)
 from addon.materials.graph import Graph, Input, Node
 from addon.snapshot.scene import Image
 from tests.materials.graphs import diffuse, emission, graph, image, math, mix, node, principled, transparent
@@ -150,6 +157,21 @@ def test_a_thin_wall_bends_no_light():
         for thin in (1.0, 0.0)
     )
     assert may_refract(pane) and not may_refract(wall)
+
+
+@pytest.mark.parametrize("nodes", [
+    [principled()], [principled(Sheen_Weight=0.5)],
+    [principled(Sheen_Weight=("Math", "Value")), math("Math", "ADD", 1.0)],
+    [principled(Subsurface_Weight=0.5)], [principled(Subsurface_Weight=0.5, Thin_Wall=1.0)],
+    [principled(Thin_Wall=1.0)],
+    *([node("Principled", f"ShaderNodeBsdf{kind}", {"BSDF": "SHADER"})]
+      for kind in ("Diffuse", "Glossy", "Sheen", "Translucent", "Toon", "HairPrincipled", "Hair", "RayPortal")),
+])  # fmt: skip
+def test_soft_lobes_are_known_before_a_material_is_compiled(nodes):
+    assert (
+        may_be_soft(graph(*nodes, surface=("Principled", "BSDF")))
+        == compiled(*nodes, surface=("Principled", "BSDF")).soft
+    )
 
 
 def test_a_wall_bends_light_where_a_node_may_say_that_it_is_not_thin():
