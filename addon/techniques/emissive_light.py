@@ -98,7 +98,13 @@ CLOSE_BY = passes.fullscreen_program(
     "light/close_by.frag.glsl",
     textures=(*acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(*RAY_CONSTANTS, ("FLOAT", "reach"), ("FLOAT", "drawn_least"), ("FLOAT", "mesh_light_level")),
+    constants=(
+        *RAY_CONSTANTS,
+        ("FLOAT", "reach"),
+        ("FLOAT", "drawn_least"),
+        ("FLOAT", "mesh_light_level"),
+        ("INT", "glass_blocks"),
+    ),
     outputs=OUTPUTS,
     leaves_out=(("links", "of meshes that links leave out pixels draw no points of their own"),),
 )
@@ -159,8 +165,11 @@ class EmissiveLight(Technique):
             yield from light_surfaces(
                 frame, self, points, 1 << lights.SURFACE, self._sources, lambda *_: self._own_rays(frame)
             )
-            yield from self._close_by(frame, float(own[lights.LIGHT.at.least]) * self._triangles.power / count)
-            frame.account.count(self, "rays per pixel", count + 1)
+            close_by = bool(self._triangles.flags[0] & lights.DIFFUSE_FLAG)  # the same of all
+            if close_by:
+                least = float(own[lights.LIGHT.at.least]) * self._triangles.power / count
+                yield from self._close_by(frame, least, blocked)
+            frame.account.count(self, "rays per pixel", count + close_by)
             if self._beside is None:
                 return
         points = []
@@ -223,13 +232,15 @@ class EmissiveLight(Technique):
             },
         )  # fmt: skip
 
-    def _close_by(self, frame: Frame, least: float) -> Iterator[None]:
-        """Add what points leave out within the root of `least` over what they are drawn in proportion to."""
-        textures, constants = ray_bindings(frame)
-        constants |= {
+    def _close_by(self, frame: Frame, least: float, glass_blocks: bool) -> Iterator[None]:
+        """Add the diffuse light that points leave out within the root of `least`, W / sr, over what they are drawn in
+        proportion to. Rays are those of diffuse paths: they meet the meshes that light diffuse surfaces, whether or not
+        those cast shadows. `glass_blocks`: photons bring what passes glass."""
+        constants = {
             "reach": self._triangles.reach_of(least), "drawn_least": least, "mesh_light_level": self._triangles.level,
+            "glass_blocks": int(glass_blocks), "offset_size": frame.offset_size,
         }  # fmt: skip
-        textures = {"energy_table": frame.materials.energy_table, **textures}
+        textures = {"energy_table": frame.materials.energy_table, **frame.hierarchy("diffuse").textures}
         program = asked(frame, CLOSE_BY, textures)
         lit = Lit(program, ANY_SURFACE, {"textures": textures, "blocks": {}, "constants": constants}, [])
         yield from repeated_light.add(frame, self, self._sources, lit)

@@ -461,7 +461,8 @@ vec3 emission_close_by(Light light, vec3 origin, vec3 normal, uint salt, out vec
   float spread = light_least(light) * light.area * emissive_density(light.radiance, level);  // the same of all points
   float reach = sqrt(spread / max(level, 1e-30));
   ivec2 hit;
-  float t = trace_nearest(origin, direction, reach, bits.z, hit);
+  bool glass_stops = (light.flags & LIGHT_GLASS_BLOCKS) != 0;  // as it does rays to those points
+  float t = trace_layers(origin, direction, reach, 0.0, bits.z, glass_stops, false, hit);
   if (t >= reach) {
     return vec3(0.0);
   }

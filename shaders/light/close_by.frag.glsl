@@ -1,6 +1,7 @@
 // Light of emissive triangles so close that points on them leave it out: a point at distance d counts min(1, d2 / least) of
 // its light (light_sample), and least is `drawn_least` over what points are drawn in proportion to. A cosine-distributed ray
-// of each pixel meets such triangles: one at distance d counts the rest.
+// of each pixel meets such triangles: one at distance d counts the rest. Like rays to points it ends at
+// glass where photons bring what passes that (`glass_blocks`).
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
@@ -25,7 +26,7 @@ void main()
   }
   vec3 origin = ray_origin(s.position, s.geometric_normal);
   ivec2 hit;
-  float t = trace_nearest(origin, direction, reach, salt.z + uint(film_view.sample_index), hit);
+  float t = trace_layers(origin, direction, reach, 0.0, salt.z + uint(film_view.sample_index), glass_blocks != 0, false, hit);
   if (t >= reach) {
     return;
   }

@@ -11,6 +11,7 @@ from addon.lighting import emissive_triangles
 from addon.lighting.emissive_triangles import along_curve, compact
 from addon.materials.energy import pane_passing
 from addon.snapshot.scene import Instance
+from addon.techniques import emissive_light
 from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
@@ -319,6 +320,46 @@ def test_a_panel_lights_what_it_nearly_touches_beside_a_stronger_one(floor, samp
     found = irradiance(floor, samples)
     assert "of each pixel's own" in str(floor.ledger.row("emissive_light").choices)
     assert found.mean() == pytest.approx(expected.mean(), rel=0.03)
+
+
+def beside_a_strong_one(stage):
+    """A panel 2 cm above the floor beside one of a hundred times its radiance, to which nearly all points go."""
+    made = panel(stage, z=0.02)
+    stage.glow = stage.material("ShaderNodeEmission", Strength=100 * RADIANCE, Color=(1, 1, 1, 1))
+    return made, panel(stage, z=-5.0)
+
+
+def test_a_panel_without_a_shadow_lights_what_it_nearly_touches(floor):
+    made, _ = beside_a_strong_one(floor)
+    made.visible_shadow = False
+    source = model.area((0, 0, 0.02), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    expected = model.irradiance(source, receivers(1))
+    assert irradiance(floor, 4).mean() == pytest.approx(expected.mean(), rel=0.03)
+
+
+def test_a_panel_that_diffuse_and_glossy_paths_do_not_see_adds_no_light_close_by(floor):
+    """Beside one that they see: it is dark to the floor, and casts a shadow."""
+    hidden = panel(floor, z=0.02, location=(-1, 0, 0))
+    hidden.visible_diffuse = hidden.visible_glossy = False
+    made, _ = beside_a_strong_one(floor)
+    made.location.x = 1.0
+    found = irradiance(floor, 4)
+    assert found[14:18, 22:26].mean() > 0.8 * RADIANCE * np.pi and found[14:18, 6:10].mean() < 0.01 * RADIANCE * np.pi
+
+
+def test_panels_that_diffuse_paths_do_not_see_add_no_diffuse_light_close_by(floor):
+    for made in beside_a_strong_one(floor):
+        made.visible_diffuse = False
+    assert irradiance(floor, 4).max() == 0.0
+
+
+def test_light_close_by_ends_at_glass_where_photons_bring_what_passes(floor, monkeypatch):
+    """Here none does."""
+    monkeypatch.setattr(emissive_light, "meshes_answered", lambda frame: True)
+    beside_a_strong_one(floor)
+    sheet = floor.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0)
+    floor.rectangle((-3, -3), (3, 3), 0.01, material=sheet).visible_camera = False
+    assert irradiance(floor, 4).max() == 0.0
 
 
 def test_a_faint_lamp_near_by_is_found_beside_a_strong_one_far_away(floor):
