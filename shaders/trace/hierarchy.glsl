@@ -284,17 +284,18 @@ uint boxes_met(Boxes b, vec3 origin, vec3 inverse, float reach, out vec4 enter)
 }
 
 // Colours of layers that the last ray of trace_layers has passed: each over the chance that a ray passes it at all. Three are
-// kept apart, of more the farthest are one. Faces of what absorbs s per metre are layers, too: a ray keeps exp(-s t) where it
+// kept apart; those beyond are one, of which the nearest and the farthest distance are known. Faces of what absorbs s per metre are layers, too: a ray keeps exp(-s t) where it
 // leaves a solid after t, over exp(-s t) where it has entered it; what it enters and does not leave absorbs up to its end.
 #ifdef TINTED_LAYERS
 #define LAYERS_KEPT 3
 #define EMISSION_TEXEL 10
 #define TINT_CODE 1000.0  // see addon/scene/traced_triangles.py
 #define STAINED -2000.0    // of red: what green and blue name
-vec4 layers_met[LAYERS_KEPT];  // colour, distance; nearest first
+vec4 layers_met[LAYERS_KEPT + 1];  // colour, distance; nearest first, the last one: all beyond
 #ifdef ABSORBING_LAYERS
-vec3 layers_entered[LAYERS_KEPT];  // what absorbs behind it, 1/m, more than before it
-vec3 layers_depth[LAYERS_KEPT];    // the same times the distance
+vec3 layers_entered[LAYERS_KEPT + 1];  // what absorbs behind it, 1/m, more than before it
+vec3 layers_depth[LAYERS_KEPT + 1];    // the same times the distance
+float layers_farthest;                 // distance of the farthest, m; 0: there is none
 #endif
 
 // As packed_tints of addon/scene/opacity_maps.py.
@@ -321,7 +322,10 @@ vec3 told_tint(ivec2 hit, vec3 told, vec3 position, vec3 mean)
 
 void layers_begin()
 {
-  for (int k = 0; k < LAYERS_KEPT; k++) {
+#ifdef ABSORBING_LAYERS
+  layers_farthest = 0.0;
+#endif
+  for (int k = 0; k <= LAYERS_KEPT; k++) {
     layers_met[k] = vec4(1.0, 1.0, 1.0, 1e30);
 #ifdef ABSORBING_LAYERS
     layers_entered[k] = vec3(0.0);
@@ -353,6 +357,7 @@ void layers_pass(int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec
       vec4 layer = vec4(color, t[i]);
 #ifdef ABSORBING_LAYERS
       vec3 depth = entered * t[i];
+      layers_farthest = max(layers_farthest, t[i]);
 #endif
       for (int k = 0; k < LAYERS_KEPT; k++) {
         if (layer.w < layers_met[k].w) {
@@ -370,10 +375,11 @@ void layers_pass(int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec
         }
       }
       if (layer.w < 1e29) {
-        layers_met[LAYERS_KEPT - 1].rgb *= layer.rgb;
+        layers_met[LAYERS_KEPT].rgb *= layer.rgb;
+        layers_met[LAYERS_KEPT].w = min(layers_met[LAYERS_KEPT].w, layer.w);
 #ifdef ABSORBING_LAYERS
-        layers_entered[LAYERS_KEPT - 1] += entered;
-        layers_depth[LAYERS_KEPT - 1] += depth;
+        layers_entered[LAYERS_KEPT] += entered;
+        layers_depth[LAYERS_KEPT] += depth;
 #endif
       }
     }
@@ -387,20 +393,18 @@ vec3 layers_color(float limit)
 #ifdef ABSORBING_LAYERS
   vec3 entered = vec3(0.0);
   vec3 depth = vec3(0.0);
-  float end = 0.0;
 #endif
-  for (int k = 0; k < LAYERS_KEPT; k++) {
+  for (int k = 0; k <= LAYERS_KEPT; k++) {
     if (layers_met[k].w < limit) {
       color *= layers_met[k].rgb;
 #ifdef ABSORBING_LAYERS
       entered += layers_entered[k];
       depth += layers_depth[k];
-      end = layers_met[k].w;
 #endif
     }
   }
 #ifdef ABSORBING_LAYERS
-  end = (limit < 1e28) ? limit : end;
+  float end = (limit < 1e28) ? limit : layers_farthest;
   color *= exp(min(depth - max(entered, vec3(0.0)) * end, vec3(0.0)));
 #endif
   return color;
@@ -430,11 +434,12 @@ void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool
     vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
                        to_unit(roll * 277803737u + 7u));
     bvec4 stops = lessThan(chance, opacity);
-#ifdef TINTED_LAYERS
-    layers_pass(leaf, t, nearest, origin, direction, facing, stops, opacity);
-#endif
+    vec4 passed = t;
     t = mix(vec4(1e30), t, stops);
     best = min(min(t.x, t.y), min(t.z, t.w));
+#ifdef TINTED_LAYERS
+    layers_pass(leaf, passed, min(nearest, best), origin, direction, facing, stops, opacity);
+#endif
     if (best < nearest) {
       nearest = best;
       hit = ivec2(leaf, (record << 2) + ((best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3));
