@@ -46,6 +46,7 @@ FLAT = 0.999  # cosine between normals of a pane's faces
 MOST_LOOKED_AT = 200_000  # triangles of a mesh of which it is asked whether it is convex
 LEAST_BENT = 0.4  # share of a convex mesh's edges at which it bends: a cube's faces would throw patches with edges
 _FEWEST_EDGES = 100
+PHOTONS_ON_GLOSS, PHOTONS_ON_SOFT = 1, 2  # as in shaders/caustics/gloss.glsl
 _BUMPS = ("ShaderNodeBump", "ShaderNodeNormalMap", "ShaderNodeDisplacement", "ShaderNodeVectorDisplacement")
 _CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHoldout", "ShaderNodeBsdfRayPortal")
 
@@ -152,6 +153,11 @@ class Answered:
         self.bright: BrightPart | None = None  # of the world
         self.on_gloss = False  # rough glossy lobes get light of lamps and the world by way of smooth glass as photons
         self.on_soft = False  # lobes without microfacets get what diffuse surfaces get
+
+    @property
+    def photons_shine(self) -> int:
+        """On which lobes photons shine: a sum of PHOTONS_ON_GLOSS and PHOTONS_ON_SOFT (shaders/caustics/gloss.glsl)."""
+        return PHOTONS_ON_GLOSS * bool(self.on_gloss) + PHOTONS_ON_SOFT * bool(self.on_soft)
 
 
 def of(frame: Frame) -> Casters | None:

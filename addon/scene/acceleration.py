@@ -166,7 +166,8 @@ def _bounds(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
-def _absorbs(leaves: np.ndarray) -> bool:
+def _any_absorbs(leaves: np.ndarray) -> bool:
+    """Whether one of the triangles of leaves (N, LEAF_TEXELS, LEAF) names a record of what its inside absorbs."""
     red, _, blue = np.moveaxis(leaves[:, EMISSION_TEXEL : EMISSION_TEXEL + 3], 1, 0)
     return bool(((red == STAINED) & (blue != 0.0)).any())
 
@@ -205,7 +206,7 @@ class Trees:
         leaves = images.upload_list(np.concatenate(texels) if len(texels) > 1 else texels[0])
         leaves.defines = (TILED if len(tiles) else ()) + (INSTANCED if len(copies) else ())
         leaves.defines += TINTED if any((tree.leaves[:, EMISSION_TEXEL] <= -TINT_CODE).any() for tree in own) else ()
-        leaves.defines += ABSORBING if any(_absorbs(tree.leaves) for tree in own) else ()
+        leaves.defines += ABSORBING if any(_any_absorbs(tree.leaves) for tree in own) else ()
         leaves.defines += SHEETS if any(is_sheet(tree.leaves[:, OPACITY_TEXEL]).any() for tree in own) else ()
         self.upper = UpperTree(copies, np.asarray(origin, float)) if len(copies) else None
         rows = self._joined(copies, starts[1:]) if len(copies) else world.boxes.linked(0, self._first_leaf)

@@ -149,7 +149,9 @@ class OpacityMaps:
         )  # fmt: skip
         self._keep(parts, sides, corners, scales, *drawn)
 
-    def _drawn(self, materials, geometry, parts, sides, corners, height) -> tuple[np.ndarray, np.ndarray, object]:
+    def _drawn(
+        self, materials, geometry, parts, sides, corners, height
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         """(height, WIDTH, 2) how much of each cell is covered, of how many samples, for front and back; and
         (height, WIDTH, 4) the sum of what passes both, of so many, or None where nothing is coloured."""
         tinted = {part.material for part in parts if materials.compiled[part.material].tinted}
@@ -172,7 +174,9 @@ class OpacityMaps:
         return found[..., 0::2], found[..., 1::2], images.read(drawn[1]) if tinted else None
 
     def _keep(self, parts, sides, corners, scales, covered, drawn, passing) -> None:
-        """Put what was drawn into tiles, the largest first, and say of each triangle where its own is."""
+        """Put what was drawn into tiles, the largest first, and say of each triangle where its own is. Of the T
+        triangles of `parts`: `sides` (T,) and `corners` (T, 2), cells, of `layout`; `scales` (T, 2), of _glass_scales.
+        Of `_drawn`: `covered` and `drawn` (height, WIDTH, 2), `passing` (height, WIDTH, 4) or None."""
         count = len(sides)
         mean, order, start, cells = np.zeros((count, 2)), np.zeros(count, np.int64), np.zeros(count, np.int64), []
         texels, tiles = 0, 0

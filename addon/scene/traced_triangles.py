@@ -58,7 +58,7 @@ def world_triangles(
     glass_sheets.py; `absorbing`: see absorption_records."""
     look = {
         (rays, mirrored): np.array([
-            (mean_code(m, rays), *(_absorbing(absorbing[k], mirrored) if k in absorbing else radiance), k + side)
+            (mean_code(m, rays), *(_absorption_code(absorbing[k], mirrored) if k in absorbing else radiance), k + side)
             for k, m in enumerate(materials)
             for radiance, side in [mean_emission(m, mirrored)]
         ])
@@ -121,7 +121,9 @@ def absorption_records(
     return texels, {k: first + RECORD * number for number, k in enumerate(own)}
 
 
-def _absorbing(record: int, mirrored: bool) -> tuple[float, float, float]:
+def _absorption_code(record: int, mirrored: bool) -> tuple[float, float, float]:
+    """What stands for emission where the inside absorbs: that there is a record, no tile of colours, and where the
+    record (absorption_records) begins among the texels; below 0 where corners run the other way round."""
     return STAINED, 0.0, -record if mirrored else record
 
 

@@ -223,7 +223,8 @@ def _fill(count: int) -> str:
 
 @dataclass
 class Records:
-    """What rays of a round met: RECORDS, the number of the material, and that as depth."""
+    """What rays of a round met: RECORDS, the number of the material, and that as depth. The images stand until `give`;
+    of these fields `all_met` alone changes, with what is drawn into `met` (Hits.trace)."""
 
     target: images.Target
     # By material, in rows of ROW: 1 if any ray has met it; in the second half, if any has met one of its program.

@@ -80,6 +80,7 @@ class Reflectance:
         if not kept:
             self.release()
             self.image = images.pool.take(COLUMNS, BANDS * rows + SKY_ROWS, "RGBA32F")
+            self._put_sky(np.zeros((SKY_ROWS, COLUMNS, 3)))  # programs of other paths' sheets may read it
         changed = [material for material, key in keys.items() if self._keys.get(material) != key]
         self._keys = keys
         if kept and not changed:
@@ -100,7 +101,7 @@ class Reflectance:
         cells = [(k % COLUMNS, band * rows + k // COLUMNS, 1, 1) for k in changed for band in range(BANDS)]
         for viewport in cells if few else [(0, 0, COLUMNS, BANDS * rows)]:
             self._average(frame, seen, viewport, rows, mirrors=0)
-        for k in filter(lambda k: _goes_on(frame, k, gloss.THROWS), changed):
+        for k in filter(lambda k: _throws(frame, k), changed):
             for band in (0, 1):  # those whose fourth number is about mirrors
                 self._average(frame, seen, (k % COLUMNS, band * rows + k // COLUMNS, 1, 1), rows, mirrors=1)
         for image in seen:
@@ -123,11 +124,15 @@ class Reflectance:
         luminance than `most`, W / (m2 sr)."""
         if self._sky != (environment, most):
             self._sky = environment, most
-            texels = np.zeros((self.image.size[1], COLUMNS, 4))
-            texels[-SKY_ROWS:, :, :3] = environment.mean_radiance(SKY_ROWS, COLUMNS, most)
-            sky = images.upload(texels)
-            viewport = (0, self.image.size[1] - SKY_ROWS, COLUMNS, SKY_ROWS)
-            passes.fullscreen(passes.COPY, images.Target((self.image,)), viewport=viewport, textures={"original": sky})
+            self._put_sky(environment.mean_radiance(SKY_ROWS, COLUMNS, most))
+
+    def _put_sky(self, radiance: np.ndarray) -> None:
+        """Fill the rows of the world: (SKY_ROWS, COLUMNS, 3), W / (m2 sr)."""
+        texels = np.zeros((self.image.size[1], COLUMNS, 4))
+        texels[-SKY_ROWS:, :, :3] = radiance
+        viewport = (0, self.image.size[1] - SKY_ROWS, COLUMNS, SKY_ROWS)
+        textures = {"original": images.upload(texels)}
+        passes.fullscreen(passes.COPY, images.Target((self.image,)), viewport=viewport, textures=textures)
 
     def release(self) -> None:
         if self.image is not None:
@@ -136,10 +141,15 @@ class Reflectance:
         self.image, self._keys, self._sky = None, {}, ()
 
 
-def _goes_on(frame: Frame, material: int, most: float = gloss.SMOOTH) -> bool:
-    """Whether it is glass, or metal up to a roughness of `most`. With gloss.THROWS: whether it throws caustics as
-    lighting/caustic_casters.py has it: polish over another surface does not, however dark that is."""
-    return smooth_metal(frame, material, most) or frame.materials.compiled[material].glass is not None
+def _goes_on(frame: Frame, material: int) -> bool:
+    """Whether photons and paths go on from it as from a mirror: glass, or metal up to a roughness of gloss.SMOOTH."""
+    return smooth_metal(frame, material) or frame.materials.compiled[material].glass is not None
+
+
+def _throws(frame: Frame, material: int) -> bool:
+    """Whether it throws caustics as lighting/caustic_casters.py has it: glass, or metal up to a roughness of
+    gloss.THROWS. Polish over another surface does not, however dark that is."""
+    return smooth_metal(frame, material, gloss.THROWS) or frame.materials.compiled[material].glass is not None
 
 
 def _mirrors_box(frame: Frame) -> np.ndarray:

@@ -190,7 +190,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
         "deeper": deeper_weight(frame),
         **dict(zip(("mirrors_low", "mirrors_high"), frame.kept(Reflectance).mirrors_box)),
         "lobe_rays": 1 if frame.settings.schedule.is_draft else LOBE_RAYS,
-        "photons_shine": frame.shared(Answered).on_gloss + 2 * frame.shared(Answered).on_soft,
+        "photons_shine": frame.shared(Answered).photons_shine,
     }
     bindings["constants"] |= {"shaded_roughness": shaded_roughness(frame), **constants}
     frame.provide(GatherBindings(bindings))

@@ -475,7 +475,7 @@ class ShadedReflections(Technique, BothWays):
                     **reach, "ray_number": number, "offset_size": frame.offset_size,
                     "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
                     "first_rays": self._first_rays, "way": way,
-                    "photons_shine": int(frame.shared(Answered).on_gloss),
+                    "photons_shine": frame.shared(Answered).photons_shine,
                 },
             )  # fmt: skip
         frame.count(self, "passes")

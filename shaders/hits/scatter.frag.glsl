@@ -67,7 +67,8 @@ void main()
 #endif
   bool both = surface_goes_both_ways(s);
 #ifndef ONWARD
-  bool takes_photons = photons_shine != 0 && way == 0 && gloss_takes_photons(s);  // none end on glass, whichever way it goes
+  // None end on glass, whichever way it goes.
+  bool takes_photons = (photons_shine & PHOTONS_ON_GLOSS) != 0 && way == 0 && gloss_takes_photons(s);
 #endif
 #ifndef ONWARD
   if (way != 0) {  // of glass that goes both ways, and of coats; the other way all lobes go

@@ -91,7 +91,7 @@ Reflection surface_reflection(Surface s, float mu)
       r.through = s.glossy_weight / max(r.diffuse, vec3(1e-30));
     }
     // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
-    for (bool fibre = s.kind == LOBE_TOON && s.glossy_tint.z < 0.9; fibre; fibre = false) {
+    for (bool fibre = is_fibre(s); fibre; fibre = false) {
       float thick = 2.0 * hair_radius(s.glossy_edge);
       r.through = hair_through(s.glossy_ior) * s.glossy_weight / max(r.diffuse, vec3(1e-30));
       r.rough = (thick > 2.0 * HAIR_FLAT) ? -thick : r.rough;

@@ -4,7 +4,7 @@
 #include "ask/view.glsl"
 #include "indirect/near.glsl"
 #include "indirect/drawn_pixel.glsl"
-#ifdef GLOSSY
+#if defined(GLOSSY) || defined(SOFT)
 #include "caustics/gloss.glsl"
 #endif
 #ifdef SOFT
@@ -67,7 +67,7 @@ void main()
         weight = may_mirror(s, direction) ? weight / float(lobe_count) : vec3(0.0);
         side = side_of_ray(s, direction);
         glossy = true;
-        gloss_takes = (photons_shine & 1) != 0 && gloss_takes_photons(s);
+        gloss_takes = (photons_shine & PHOTONS_ON_GLOSS) != 0 && gloss_takes_photons(s);
       }
 #endif
 #ifdef SOFT
@@ -78,7 +78,7 @@ void main()
         direction = cosine_direction(turn * soft.normal, u);
         side *= turn;
         glossy = soft.glossy;
-        soft_takes = (photons_shine & 2) != 0 && !soft.fibre;
+        soft_takes = (photons_shine & PHOTONS_ON_SOFT) != 0 && !soft.fibre;
         if (soft.fibre) {
           direction = fibre_sample(soft, vec4(to_unit(roll.x), to_unit(roll.y), u), weight);
           start = fibre_start(soft, s.position, direction, side);

@@ -204,6 +204,12 @@ bool has_diffuse_lobe(Surface s)
   return max_component(s.glossy_weight) > 0.0 && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
 }
 
+// Whether a surface's lobe is that of a fibre (lib/hair.glsl).
+bool is_fibre(Surface s)
+{
+  return s.kind == LOBE_TOON && s.glossy_tint.z < 0.9;
+}
+
 // Colour of all that a surface adds to the diffuse passes.
 vec3 diffuse_color(Surface s)
 {

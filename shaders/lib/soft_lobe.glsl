@@ -78,7 +78,7 @@ SoftLobe soft_lobe_begin(Surface s, vec3 view)
     float spread = max(s.glossy_roughness, 0.01);
     lobe.shape = vec2(1.0 / (spread * spread), 0.0);
   }
-  else if (s.kind == LOBE_TOON && s.glossy_tint.z < 0.9) {
+  else if (is_fibre(s)) {
     lobe.fibre = true;
     soft_fibre(lobe, s);
   }

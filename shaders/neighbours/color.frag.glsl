@@ -9,7 +9,6 @@ void main()
   if (position.w != 0.0) {
     Surface s = surface_decode(position, surface_normal_fetch(pixel), surface_diffuse_fetch(pixel),
                                surface_tint_fetch(pixel), surface_lobe_fetch(pixel), vec4(0.0));
-    bool fibre = s.kind == LOBE_TOON && s.glossy_tint.z < 0.9;  // as soft_lobe_begin tells
-    out_color = vec4(diffuse_color(s), has_diffuse_lobe(s) ? (fibre ? -1.0 : float(s.kind)) : 0.0);
+    out_color = vec4(diffuse_color(s), has_diffuse_lobe(s) ? (is_fibre(s) ? -1.0 : float(s.kind)) : 0.0);
   }
 }

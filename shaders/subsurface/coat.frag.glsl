@@ -80,7 +80,7 @@ void main()
     vec3 color = scatter_means_fetch(ivec2(material & 15, (material >> 4) + scatter_means_size().y / 3)).rgb;
     float whole = max(leaves + back, 1e-6);
     // Of even light a face from outside (Kulla and Conty 2017).
-    float passes = 1.0 - (index - 1.0) / (4.08567 + 1.00071 * index);
+    float passes = 1.0 - fresnel_average_dielectric(index);
     float returned = min(back / whole, 0.99);
     vec3 again = clamp(color, vec3(0.0), vec3(1.0)) * returned;
     vec3 times = (vec3(1.0) - pow(again, vec3(float(bounces + 1)))) / (vec3(1.0) - again);

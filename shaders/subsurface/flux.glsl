@@ -19,8 +19,7 @@ float box_of(int object)
   return splat_objects_fetch(ivec2((object - 1) & 2047, (object - 1) >> 11)).y;
 }
 
-// `cosine`: of the light to the surface's normal; below 0: light from many sides, of which a dielectric reflects the mean (Kulla and
-// Conty 2017).
+// `cosine`: of the light to the surface's normal; below 0: light from many sides, of which a dielectric reflects the mean.
 void enters(vec3 place, vec3 flux, float cosine, int object, int material, vec4 painted)
 {
   ivec2 at = ivec2(material & 15, material >> 4);
@@ -34,7 +33,7 @@ void enters(vec3 place, vec3 flux, float cosine, int object, int material, vec4 
   vec4 voxels = object_texel(first_object + OBJECT_TEXELS * (object - 1) + 2);
   float size = object_texel(first_object + OBJECT_TEXELS * (object - 1) + 1).w * length(voxels.xyz);
   Dipole profile = dipole_of(length_m.w < 0.5, length_m.xyz, color.rgb, share.w);
-  float enters = (cosine < 0.0) ? 1.0 - (share.w - 1.0) / (4.08567 + 1.00071 * share.w) : 1.0 - fresnel_dielectric(cosine, share.w);
+  float enters = (cosine < 0.0) ? 1.0 - fresnel_average_dielectric(share.w) : 1.0 - fresnel_dielectric(cosine, share.w);
   out_point = vec4(place, float(object) + 0.5 * clamp(painted.w, 0.0, 1.0));
   out_flux = vec4(flux * enters, min(dipole_range(profile), size));
 }

@@ -152,6 +152,19 @@ def test_gloss_that_is_thrown_wider_than_it_is_is_named(monkeypatch, inputs, sai
     )
 
 
+def test_metal_is_named_from_where_it_throws_no_caustics(monkeypatch):
+    """As widely as it throws them all that is narrower than the lobes of paths does."""
+    for name in ("too_many", "too_many_copies"):
+        monkeypatch.setattr(acceleration, name, lambda snapshot: None)
+    monkeypatch.setattr(left_out.gloss, "THROWS", 0.3)
+    plan = Plan((), (), {"indirect": "instant_radiosity", "caustics": "caustics"})
+    for rough, said in ((0.31, True), (0.3, False)):
+        material, graph = glossy("Pan", Metallic=1.0, Roughness=rough)
+        scene = SimpleNamespace(camera=None, used_materials={0}, materials=[SimpleNamespace(graph=graph)])
+        notes = left_out.notes_of(plan, scene, SimpleNamespace(bounces=4), [material])
+        assert [("roughness 0.3 or less" in note.text) for note in notes] == [True] * said
+
+
 def test_smooth_metal_is_named_where_nothing_throws_caustics(monkeypatch):
     for name in ("too_many", "too_many_copies"):
         monkeypatch.setattr(acceleration, name, lambda snapshot: None)
