@@ -19,7 +19,7 @@ angle of view (Chandrasekhar).
 
 | cost | per sample |
 |---|---|
-| passes | 1 of the draws that scatter, 1 to 4 over the points, 2 over the picture, 2 more for walks |
+| passes | 1 of the draws that scatter, 1 to 4 over the points, 5 more in glass, 2 over the picture, 2 more for walks |
 | rays | a point: one per lamp point, `world directions` and `emissive points`; 4 for indirect light |
 | fetches, bytes per pixel | 5 per tap, 3 per point within reach, 1 per row; 32, and 208 while it runs; 400 a point |
 
@@ -125,18 +125,27 @@ COAT = passes.fullscreen_program(
     textures=(
         *acceleration.HIERARCHY_TEXTURES,
         *POINT_TEXTURES[:2],
-        *(("RGBA32F", name) for name in ("point_instances", "scatter_means", "glass_indices")),
+        ("RG32F", "trace_owners"),
+        *(("RGBA32F", name) for name in (
+            "point_instances", "scatter_means", "glass_indices", "scatter_objects", "scatter_near",
+        )),
     ),
     blocks=((VIEW, "film_view"),),
-    constants=(("FLOAT", "offset_size"), ("INT", "bounces")),
-    outputs=(("VEC4", "out_coat"), ("VEC4", "out_bent")),
-)
+    constants=(("FLOAT", "offset_size"), ("INT", "bounces"), ("INT", "first_object"), ("INT", "first_leaf")),
+    outputs=tuple(("VEC4", f"out_{name}") for name in ("coat", "bent", "again", "landed")),
+)  # fmt: skip
 ENTER = passes.fullscreen_program(
     "light that enters in glass",
     "subsurface/enter.frag.glsl",
-    textures=tuple(
-        ("RGBA32F", name) for name in ("cell_direct", "cell_across", "cell_coat", "cell_bent", "point_entry")
-    ),
+    textures=tuple(("RGBA32F", name) for name in ("cell_direct", "cell_across", "cell_bent", "point_entry")),
+    outputs=(("VEC4", "out_direct"),),
+)
+ECHOES = 4  # times that light which glass mirrors back is followed to where it enters
+ECHO = passes.fullscreen_program(
+    "light that glass mirrors back",
+    "subsurface/echo.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in ("cell_direct", "cell_entered", "cell_again", "cell_landed")),
+    constants=(("INT", "first"), ("INT", "left")),
     outputs=(("VEC4", "out_direct"),),
 )
 LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
@@ -215,9 +224,9 @@ class ImageSpaceSubsurface(Technique):
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
         self._shapes: images.Image | None = None  # of cells: normal, depth, mean length of lines through
-        # Of cells, where anything is glass: by how much more light enters, and how by the cosine at which it arrives.
-        self._coat: images.Image | None = None
-        self._bent: images.Image | None = None
+        # Of cells, where anything is glass: by how much more light enters, how by the cosine at which it arrives, how
+        # much of what leaves comes back, and from which cells.
+        self._coats: tuple[images.Image, ...] = ()
         self._coated: set[int] = set()  # materials of what glass may be around
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
@@ -234,7 +243,7 @@ class ImageSpaceSubsurface(Technique):
         form = (
             splatted_light.PROGRAMS if self._splatted(settings, snapshot) else (GATHER, APPLY, *walked_light.PROGRAMS)
         )
-        in_glass = (COAT, ENTER, LIGHTING_WITH_WAYS)
+        in_glass = (COAT, ENTER, ECHO, LIGHTING_WITH_WAYS)
         return CHORD, *in_glass, LIGHTING, *form, *leaving_light.PROGRAMS
 
     def _splatted(self, settings: Settings, snapshot: Snapshot) -> bool:
@@ -354,17 +363,22 @@ class ImageSpaceSubsurface(Technique):
         self._coated = {slot for row in rows for slot in placed[row].materials}
         listed = np.zeros((max(len(indices), len(placed)), 4), np.float32)
         listed[: len(indices), 0], listed[rows, 1] = indices, 1.0
-        self._coat, self._bent = (images.pool.take(ROW, self.points.rows, "RGBA32F") for _ in range(2))
+        self._coats = tuple(images.pool.take(ROW, self.points.rows, "RGBA32F") for _ in COAT.outputs)
         position, normal = self.points.surface(0)
+        owners, first_leaf = frame.kept(Hits).owners(frame, frame.hierarchy("shadow"))
         passes.fullscreen(
-            COAT, images.Target((self._coat, self._bent)),
+            COAT, images.Target(self._coats),
             textures={
-                **frame.hierarchy("shadow").textures, "point_position": position, "point_normal": normal,
+                **frame.hierarchy("shadow").textures, "trace_owners": owners, "scatter_objects": self.points.table,
+                "scatter_near": self.points.near, "point_position": position, "point_normal": normal,
                 "point_instances": self.points.instances, "scatter_means": frame.kept(ScatterMeans).image,
                 "glass_indices": images.upload_list(listed),
             },
             blocks={"film_view": frame.view_block},
-            constants={"offset_size": frame.offset_size, "bounces": frame.settings.bounces},
+            constants={
+                "offset_size": frame.offset_size, "bounces": frame.settings.bounces,
+                "first_object": self.points.first_object, "first_leaf": first_leaf,
+            },
         )  # fmt: skip
 
     # Light at points of the mesh --------------------------------------------------------------------------------------
@@ -374,9 +388,9 @@ class ImageSpaceSubsurface(Technique):
         direct = self._directly_lit(frame)
         indirect = images.pool.take(*direct.size, "RGBA32F")
         self._light_indirectly(frame, *self.points.surface(frame.sample), indirect)
-        if self._coat is not None:
+        if self._coats:
             target = images.Target((indirect,))
-            passes.fullscreen(passes.COPY, target, blend="MULTIPLY", textures={"original": self._coat})
+            passes.fullscreen(passes.COPY, target, blend="MULTIPLY", textures={"original": self._coats[0]})
         return direct, indirect
 
     def _directly_lit(self, frame: Frame) -> images.Image:
@@ -384,7 +398,7 @@ class ImageSpaceSubsurface(Technique):
         if self._direct is not None and self._direct[0] == frame.sample:
             return self._direct[1]
         size = (ROW, self.points.rows)
-        direct, *others = (images.pool.take(*size, "RGBA32F") for _ in range(2 if self._coat is None else 3))
+        direct, *others = (images.pool.take(*size, "RGBA32F") for _ in range(3 if self._coats else 2))
         position, normal = self.points.surface(frame.sample)
         target = images.Target((direct, *others))
         target.clear()
@@ -394,16 +408,27 @@ class ImageSpaceSubsurface(Technique):
         surfaces |= {"emission": black}
         drawn, rays = self._light.add(frame, surfaces, target, instances=self.points.instances)
         frame.count(self, "passes", drawn)
-        if self._coat is not None:
-            target = images.Target((others[-1],))
+        if self._coats:
+            _, bent, again, landed = self._coats
             passes.fullscreen(
-                ENTER, target,
+                ENTER, images.Target((others[-1],)),
                 textures={
-                    "cell_direct": direct, "cell_across": others[0], "cell_coat": self._coat, "cell_bent": self._bent,
-                    "point_entry": tint,
+                    "cell_direct": direct, "cell_across": others[0], "cell_bent": bent, "point_entry": tint,
                 },
             )  # fmt: skip
-            direct, others[-1] = others[-1], direct
+            entering, pair = others[-1], (direct, others[0])
+            entered, echoes = entering, min(ECHOES, frame.settings.bounces)
+            for k in range(echoes):
+                passes.fullscreen(
+                    ECHO, images.Target((pair[k & 1],)),
+                    textures={
+                        "cell_direct": entering, "cell_entered": entered, "cell_again": again, "cell_landed": landed,
+                    },
+                    constants={"first": int(k == 0), "left": frame.settings.bounces - echoes},
+                )  # fmt: skip
+                entered = pair[k & 1]
+            direct, others = entered, [one for one in (entering, *pair) if one is not entered]
+            frame.count(self, "passes", 1 + echoes)
         for image in others:
             images.pool.give(image)
         frame.count(self, "rays", rays * ROW * self.points.rows)
@@ -419,9 +444,9 @@ class ImageSpaceSubsurface(Technique):
                 {
                     "cell_direct": direct, "cell_shapes": self._shapes, "walk_lobes": self._lobes,
                     "scatter_means": frame.kept(ScatterMeans).image,
-                    "cell_coat": self._coat or self._shapes,  # not read without a coat
+                    "cell_coat": self._coats[0] if self._coats else self._shapes,  # not read without a coat
                 },
-                coated=self._coat is not None,
+                coated=bool(self._coats),
             )  # fmt: skip
             self._leaving_sample = frame.sample
             frame.count(self, "passes", drawn)
@@ -512,10 +537,10 @@ class ImageSpaceSubsurface(Technique):
         frame.count(self, "passes", 2)
 
     def _give_shapes(self) -> None:
-        for image in (self._shapes, self._coat, self._bent):
+        for image in (self._shapes, *self._coats):
             if image is not None:
                 images.pool.give(image)
-        self._shapes = self._coat = self._bent = None
+        self._shapes, self._coats = None, ()
         self._coated = set()
 
     def _give_whole(self) -> None:

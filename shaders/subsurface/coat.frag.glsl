@@ -8,13 +8,15 @@
 //
 // Bent glass brings light of a lamp elsewhere than a straight ray, some from below the point's horizon. So of light straight from
 // sources, which arrives at the cosine c to the point's normal, enters (a + b c) in place of c; a and b are those with which the
-// directions in which the rays leave have the mean and the mean cosine that they have (out_bent, over the factor above).
+// directions in which the rays leave have the mean and the mean cosine that they have (out_bent, without the sum over bounces).
+// What the glass mirrors back of it comes from where it left: out_landed has the cells of four of the rays, drawn by what each
+// brings, out_again what of the light there enters here (echo.frag.glsl).
 //
 // Rays of indirect light that begin at such points bring none of what their glass mirrors (trace_vertex of indirect/path.glsl). w: 1 in glass, else 0, and the factor is 1.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
-#include "trace/rays.glsl"
-#include "subsurface/image.glsl"
+#include "subsurface/walks.glsl"
+#include "subsurface/again.glsl"
 
 #define WAYS 64
 #define FACES 12  // that a ray is mirrored by
@@ -30,6 +32,25 @@ float glass_index(ivec2 hit)
   return glass_indices_fetch(ivec2(material & 2047, material >> 11)).x;
 }
 
+vec4 object_texel(int index)
+{
+  return scatter_objects_fetch(ivec2(index & 2047, index >> 11));
+}
+
+// The cell of the instance where a ray has met it; -1 of other instances.
+int cell_met(ivec2 hit, vec3 met, vec3 direction, float instance)
+{
+  if (instance_of(hit) != instance) {
+    return -1;
+  }
+  vec3 normal = triangle_normal(hit);
+  bool behind = dot(normal, direction) > 0.0;
+  vec4 sides = object_texel(int(instance));
+  int listed = first_object + OBJECT_TEXELS * (int((behind ? sides.y : sides.x) + 0.5) - 1);
+  return (listed < first_object)
+         ? -1 : cell_near(met, behind ? -normal : normal, object_texel(listed + 1), object_texel(listed + 2));
+}
+
 void main()
 {
   ivec2 texel = ivec2(gl_FragCoord.xy);
@@ -41,6 +62,8 @@ void main()
   float leaves = 0.0;
   float ahead = 0.0;  // of that, by the cosine between the direction outside and the normal
   float back = 0.0;
+  float landing = 0.0;  // of that, on points of the instance
+  vec4 landed = vec4(float(texel.y * ROW + texel.x));
   int instance = int(point_instances_fetch(texel).z + 0.5);
   bool may_be_within = place.w > 0.0 && glass_indices_fetch(ivec2(instance & 2047, instance >> 11)).y > 0.0;
   for (int k = 0; k < WAYS && may_be_within; k++) {
@@ -57,7 +80,14 @@ void main()
       float cosine = dot(normal, direction);
       if (n <= 0.0 || cosine <= 0.0) {
         // What stands in the glass; or the glass is not around the point.
+        int cell = (hit.x >= 0 && faces > 0) ? cell_met(hit, met, direction, float(instance)) : -1;
         back += (faces > 0) ? left : 0.0;
+        if (cell >= 0) {
+          landing += left;
+          uvec3 draw = hash3(roll + uvec3(uint(k), 1u, 2u));
+          vec4 drawn = vec4(to_unit(draw.x), to_unit(draw.y), to_unit(draw.z), to_unit(hash3(draw).x));
+          landed = mix(landed, vec4(float(cell)), vec4(lessThan(drawn * landing, vec4(left))));
+        }
         break;
       }
       within += (faces == 0) ? 1.0 : 0.0;
@@ -75,6 +105,8 @@ void main()
   }
   out_coat = vec4(1.0, 1.0, 1.0, 0.0);
   out_bent = vec4(0.0, 1.0, 0.0, 0.0);
+  out_again = vec4(0.0);
+  out_landed = landed;
   if (2.0 * within > float(WAYS)) {
     int material = int(point_instances_fetch(texel).w + 0.5);
     vec3 color = scatter_means_fetch(ivec2(material & 15, (material >> 4) + scatter_means_size().y / 3)).rgb;
@@ -83,12 +115,13 @@ void main()
     float passes = 1.0 - fresnel_average_dielectric(index);
     float returned = min(back / whole, 0.99);
     vec3 again = clamp(color, vec3(0.0), vec3(1.0)) * returned;
-    vec3 times = (vec3(1.0) - pow(again, vec3(float(bounces + 1)))) / (vec3(1.0) - again);
-    out_coat = vec4(leaves / (whole * passes) * times, 1.0);
+    float once = leaves / (whole * passes);
+    out_coat = vec4(once * echoes(again, bounces), 1.0);
+    out_again.rgb = again;
     // Rays to sources pass a face as half of a pane (pane_passing of materials/energy.py).
     float face_reflects = fresnel_dielectric(sqrt(0.5), index);
     float of_lamps = sqrt((1.0 - face_reflects) / (1.0 + face_reflects));
     float slope = 6.0 * (ahead / max(leaves, 1e-6) - 0.5);
-    out_bent.xy = passes / of_lamps * vec2(0.5 * (1.0 - slope), slope);
+    out_bent.xy = once * passes / of_lamps * vec2(0.5 * (1.0 - slope), slope);
   }
 }

@@ -7,5 +7,5 @@ void main()
   vec4 bent = cell_bent_fetch(texel);
   vec3 even = cell_across_fetch(texel).rgb * point_entry_fetch(texel).rgb / PI;
   vec3 entering = bent.x * even + bent.y * cell_direct_fetch(texel).rgb;
-  out_direct = vec4(cell_coat_fetch(texel).rgb * max(entering, vec3(0.0)), 0.0);
+  out_direct = vec4(max(entering, vec3(0.0)), 0.0);
 }

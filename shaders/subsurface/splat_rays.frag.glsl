@@ -20,12 +20,7 @@ void main()
   if (t >= 1e29) {
     return;
   }
-  float instance = owner_texel((hit.x - first_leaf) * 4 + HIT_SLOT(hit)).x;
-#ifdef INSTANCED
-  if (HIT_RECORD(hit) != 0) {
-    instance = owner_texel(int(node_texel(HIT_RECORD(hit) * NODE_TEXELS + 3).y)).x;
-  }
-#endif
+  float instance = instance_of(hit);
   vec3 normal = triangle_normal(hit);
   bool behind = dot(normal, way) > 0.0;
   vec4 sides = object_texel(int(instance));

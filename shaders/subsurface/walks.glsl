@@ -49,6 +49,17 @@ vec4 owner_texel(int index)
   return trace_owners_fetch(ivec2(index & 2047, index >> 11));
 }
 
+// Row of the instance that a ray has met.
+float instance_of(ivec2 hit)
+{
+#ifdef INSTANCED
+  if (HIT_RECORD(hit) != 0) {
+    return owner_texel(int(node_texel(HIT_RECORD(hit) * NODE_TEXELS + 3).y)).x;
+  }
+#endif
+  return owner_texel((hit.x - first_leaf) * 4 + HIT_SLOT(hit)).x;
+}
+
 // Distance to the surface of the instance, or `limit`; what else stands in the way is passed.
 float own_surface(vec3 origin, vec3 direction, float limit, float instance, uint salt, out ivec2 hit)
 {
@@ -58,14 +69,8 @@ float own_surface(vec3 origin, vec3 direction, float limit, float instance, uint
     if (begun + t >= limit) {
       return limit;
     }
-    float row = owner_texel((hit.x - first_leaf) * 4 + HIT_SLOT(hit)).x;
-#ifdef INSTANCED
-    if (HIT_RECORD(hit) != 0) {
-      row = owner_texel(int(node_texel(HIT_RECORD(hit) * NODE_TEXELS + 3).y)).x;
-    }
-#endif
     begun += t;
-    if (row == instance) {
+    if (instance_of(hit) == instance) {
       return begun;
     }
     begun += ray_offset(origin);
