@@ -40,13 +40,14 @@ REFLECTANCE = passes.fullscreen_program(
     "indirect/reflectance.frag.glsl",
     textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     constants=(("IVEC2", "extent"), ("INT", "rows"), ("FLOAT", "view_cosine"), ("INT", "mirrors")),
-    defines=tuple((name, f"{most + 1e-4:.4f}") for name, most in (("THROWS", gloss.THROWS), ("SMOOTH", gloss.SMOOTH))),
+    defines=(("THROWS", f"{gloss.THROWS + 1e-4:.4f}"),),
     outputs=(("VEC4", "out_reflectance"),),
 )
 # For programs that read the image where a technique brings what mirrors and glass throw on diffuse surfaces.
 MIRRORS_OWNED = (("MIRRORS_OWNED", "1"),)
 TURNED = (("TURNED_NORMALS", "1"),)  # where a material turns normals
-MIRRORS = (("SMOOTH_MIRRORS", "1"),)  # where a material is smooth metal
+# Where a material is smooth metal: up to this mean of the mirror's alpha.
+MIRRORS = (("SMOOTH_MIRRORS", f"{(gloss.SMOOTH + 1e-4) ** 2:.6f}"),)
 MIRRORS_DROPPED = (("MIRRORS_DROPPED", "1"),)  # where Blender's Reflective Caustics are off
 MATT = (("MATT", "1"),)  # where all materials are diffuse, and programs hold what a scene needs
 TURNING = ("ShaderNodeNormalMap", "ShaderNodeBump")

@@ -34,7 +34,7 @@ vec3 traced_member(Cluster c, Surface s, vec3 origin, float total, float u, uint
     if (share > 0.0 && u * total < passed) {
       VirtualLight member = virtual_light(i);
       light *= total / share * virtual_light_seen(member, origin, salt);
-      light *= layers_color(1e30);
+      light *= layers_color(distance(member.position, origin));
       return light * passing_from(member.position, origin, salt);
     }
   }

@@ -3,8 +3,8 @@
 #define LIT_BY_MAPS
 #define BOUNCED
 #define PART 128  // virtual lights that a hit looks at
-#include "hits/receiver.glsl"
 #include "indirect/near.glsl"
+#include "hits/receiver.glsl"
 
 // By virtual lights, and by a short ray for what those leave out.
 vec3 light_of_turn(Receiver r, uvec3 roll)
@@ -17,8 +17,9 @@ vec3 light_of_turn(Receiver r, uvec3 roll)
   vec3 lit = r.surface.normal;
   vec3 side = r.surface.geometric_normal;
   vec3 position = r.surface.position;
+  bool passes = false;
   if (max_component(reflection.through) > 0.0) {
-    bool passes = reflects_far_side(reflection, to_unit(hash3(roll).x));
+    passes = reflects_far_side(reflection, to_unit(hash3(roll).x));
     position -= passes ? max(-reflection.rough, 0.0) * side : vec3(0.0);
     lit = passes ? -lit : lit;
     side = passes ? -side : side;
@@ -33,7 +34,7 @@ vec3 light_of_turn(Receiver r, uvec3 roll)
   vec3 weight;
 #ifdef MIRRORS_OWNED
   mapped_position = position;
-  mapped_normal = side;
+  mapped_normal = (passes || reflection.rough < 0.0) ? vec3(0.0) : side;  // maps bring nothing to far sides and fibres
 #endif
   walk.direction = reflection_sample(reflection, lit, r.viewer, vec2(to_unit(roll.x), to_unit(roll.y)), weight);
   if (dot(walk.direction, side) > 0.0 && max_component(weight) > 0.0) {

@@ -50,10 +50,12 @@ vec3 light_close_by(Receiver r, Light light, uint salt)
   return reflected_light(r, light, arriving * (PI / max(dot(direction, r.surface.normal), 1e-6)), direction, 0.0);
 }
 
-// By a point on one of the sources, drawn in proportion to what it brings unblocked.
+// By a point on one of the sources, drawn in proportion to what it brings unblocked. `emissive`: a point on an emissive surface,
+// below 0 where there is none or one of them leaves this receiver unlit: a ray would not tell which it meets.
 vec3 light_of_points(Receiver r, uint salt, out int emissive)
 {
   emissive = -1;
+  bool all_linked = true;
   float total = 0.0;
   float chosen_share = 0.0;
   int chosen = -1;
@@ -64,10 +66,11 @@ vec3 light_of_points(Receiver r, uint salt, out int emissive)
     Light light = light_read(i);
 #ifdef HAS_RECEIVER_GROUPS
     if (((light.unlit >> r.group) & 1) != 0) {
+      all_linked = all_linked && !LIGHT_IS(light, LIGHT_SURFACE);
       continue;
     }
 #endif
-    emissive = LIGHT_IS(light, LIGHT_SURFACE) ? i : emissive;
+    emissive = (LIGHT_IS(light, LIGHT_SURFACE) && (light.flags & LIGHT_DIFFUSE) != 0) ? i : emissive;
     vec3 direction;
     float density;
     vec3 arriving = light_sample(light, r.surface.position, direction, density);
@@ -84,6 +87,7 @@ vec3 light_of_points(Receiver r, uint salt, out int emissive)
       chosen_direction = direction;
     }
   }
+  emissive = all_linked ? emissive : -1;
   if (!(total > DARK) || chosen < 0) {
     return vec3(0.0);
   }
@@ -104,7 +108,7 @@ vec3 light_of_points(Receiver r, uint salt, out int emissive)
   bool glass_stops = r.bends || r.within || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
   bool looks = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0;
   bool blocked = looks && trace_layers(origin, chosen_direction, reach, reach, salt, glass_stops, true, hit) < reach;
-  chosen_light *= looks ? layers_color(1e30) : vec3(1.0);
+  chosen_light *= looks ? layers_color(reach) : vec3(1.0);
   float through = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
   chosen_light *= blocked ? vec3(0.0) : media_transmittance(origin, chosen_direction, through, salt);
   return blocked ? vec3(0.0) : chosen_light * (total / chosen_share);

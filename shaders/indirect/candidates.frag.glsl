@@ -1,6 +1,7 @@
 // Candidates for virtual lights: points that light the picture, found from the picture. A pixel's cosine-distributed ray
 // meets a surface. What that reflects of light straight from sources, and what comes to it from the next surface on a path
 // of up to `bounces` reflections, are estimated apart: candidates share their next surfaces (indirect/pairs.frag.glsl).
+#define SHEETS_FIND_SKY
 #include "indirect/path.glsl"
 #include "indirect/probe.glsl"
 
@@ -39,7 +40,8 @@ void main()
   bool mirrored = false;    // the path goes on by a mirror
   bool from_sheet = false;  // by a sheet of glass, from within
   // The first surface and the next ones by the same calls: compilers hold the code of each.
-  for (int bounce = 1; bounce <= max(bounces, 1) && max_component(throughput) > 1e-4; bounce++) {
+  int most = max(bounces, 1);
+  for (int bounce = 1; (bounce <= most || from_sheet) && max_component(throughput) > 1e-4; bounce++) {
     if (bounce > 1) {
       roll = hash3(roll);
       vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));
@@ -76,9 +78,13 @@ void main()
     }
     if (!trace_vertex(origin, direction, 1e29, 0.0, in_glass, roll.z, met, t)) {
 #ifdef GLASS_SHEETS
-      later += from_sheet ? throughput * met.passed * wide_sky(direction) : vec3(0.0);
-      later_shorter = later;
+      vec3 passing = met.passed * passing_media(origin, direction, FARTHEST_MEDIUM, roll.y);
+      later += from_sheet ? throughput * passing * wide_sky(direction) : vec3(0.0);
+      later_shorter = (bounce <= bounces) ? later : later_shorter;
 #endif
+      break;
+    }
+    if (bounce > most) {
       break;
     }
     if (bounce > 1) {

@@ -58,7 +58,7 @@ vec3 virtual_light_arriving(VirtualLight light, vec3 origin, uint salt)
   float reach = length(path);
   vec3 direction = path / max(reach, 1e-30);
   float seen = virtual_light_seen(light, origin, salt);
-  vec3 colored = seen * layers_color(1e30);
+  vec3 colored = seen * layers_color(reach);
   return light.intensity * colored * passing_media(origin, direction, reach, salt);
 }
 

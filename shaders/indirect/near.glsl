@@ -5,6 +5,7 @@
 // lights do not send (indirect/candidates.frag.glsl): rays meet that at any distance, and go on over the mirror. A program
 // that includes this has the constants `virtual_count`, `near_radius`, `glossy_radius` and `deeper`, and of the box
 // around all mirrors `mirrors_low` and `mirrors_high`, besides those of indirect/path.glsl.
+#define SHEETS_FIND_SKY
 #include "indirect/path.glsl"
 #include "indirect/lights.glsl"
 

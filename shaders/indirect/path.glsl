@@ -14,7 +14,7 @@
 #include "ask/leaving.glsl"
 
 #if defined(GLASS_SHEETS) && !defined(SMOOTH_MIRRORS)
-#define SMOOTH_MIRRORS  // sheets of glass mirror from within
+#define SMOOTH_MIRRORS 0.0  // up to this alpha; sheets of glass mirror from within
 #endif
 #define LAYERS_PASSED 16     // surfaces that a ray to a light goes through that they do not block
 
@@ -155,9 +155,10 @@ bool may_be_mirror(ivec2 hit, vec3 position, vec3 direction)
   int material = triangle_material(hit);
   ivec2 place = ivec2(material & 15, material >> 4);
   int rows = reflectance_size().y / REFLECTANCE_BANDS;
-  bool metal = reflectance_fetch(place).a > 0.5;
+  float code = reflectance_fetch(place).a;
+  bool metal = code > 0.5;
   for (bool unsure = metal; unsure; unsure = false) {
-    metal = reflectance_fetch(place + ivec2(0, rows)).a >= 0.0
+    metal = reflectance_fetch(place + ivec2(0, rows)).a <= SMOOTH_MIRRORS * code
             && max_component(reflectance_fetch(place + ivec2(0, 3 * rows)).rgb) > 0.0;
   }
 #ifdef GLASS_SHEETS
@@ -174,7 +175,7 @@ float sheet_mirrors(ivec2 hit, float cosine)
   float sides = mod(-leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)], SIDES * SIDES);
   vec2 passing = vec2(1.0) - vec2(floor(sides / SIDES), mod(sides, SIDES)) / (SIDES - 1.0);
   float leaving = min(passing.x, passing.y);  // over n2 as many directions
-  float ior = sqrt(leaving / max(passing.x, passing.y));
+  float ior = sqrt(leaving / max(max(passing.x, passing.y), 1e-3));
   return fresnel_dielectric(cosine, ior) / max(1.0 - leaving, 1e-3);
 }
 
@@ -211,7 +212,8 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
   for (; is_mirror; is_mirror = false) {
     ivec2 place = ivec2(material & 15, (material >> 4) + reflectance_size().y / REFLECTANCE_BANDS);
-    met.mirror_alpha = reflectance_fetch(place).a / code;
+    float alpha = reflectance_fetch(place).a / code;
+    met.mirror_alpha = (alpha <= SMOOTH_MIRRORS) ? alpha : -1.0;
     met.mirror_share = mirror_scale(material);
     vec3 smooth_normal = triangle_shading_normal(hit, met.position);
     smooth_normal = (dot(smooth_normal, met.normal) < 0.0) ? -smooth_normal : smooth_normal;
@@ -374,21 +376,23 @@ float light_reach(Light light, vec3 origin, inout vec3 direction)
   return light_distance(light, origin, direction);
 }
 
-// Whether this sample's point of a light is seen along `direction`.
-float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
+// What surfaces let pass of this sample's point of a light that is seen along `direction`.
+vec3 light_passing(Light light, vec3 origin, vec3 direction, uint salt)
 {
   float reach = light_reach(light, origin, direction);
   ivec2 hit;
 #ifdef HIT_LINKS
   if (light.first_view != 0) {
     // Groups of blockers that let its light pass: the ray goes on behind what belongs to them.
+    vec3 passed = vec3(1.0);
     for (int i = 0; i < LAYERS_PASSED; i++) {
       float t = trace_layers(origin, direction, reach, 0.0, salt, false, true, hit);
+      passed *= layers_color(t);
       if (t >= reach) {
-        return 1.0;
+        return passed;
       }
       if (((light.first_view >> triangle_links(hit).y) & 1) == 0) {
-        return 0.0;
+        return vec3(0.0);
       }
       vec3 normal = triangle_normal(hit);
       origin = ray_origin(origin + t * direction, (dot(normal, direction) < 0.0) ? -normal : normal);
@@ -397,10 +401,10 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
         reach = light_reach(light, origin, direction);
       }
     }
-    return 0.0;
+    return vec3(0.0);
   }
 #endif
-  return (trace_shadow(origin, direction, reach, salt, hit) >= reach) ? 1.0 : 0.0;
+  return (trace_shadow(origin, direction, reach, salt, hit) >= reach) ? layers_color(reach) : vec3(0.0);
 }
 
 // How much of even light from all sides bumps leave to be reflected: what they turn away from, and what they shadow
@@ -425,8 +429,8 @@ bool light_maps(Light light)
 }
 #endif
 
-// What reflects light straight from this source: not the lobe where photons bring what that mirrors, nor, of the world, where
-// rays that a sheet of glass mirrors find it.
+// What reflects light straight from this source: not the lobe where photons bring what that mirrors, nor, where rays that a
+// sheet of glass mirrors find the world (SHEETS_FIND_SKY), of that what wide_sky has.
 Reflection straight_reflection(Vertex met, Light light)
 {
   Reflection reflection = met.reflection;
@@ -441,8 +445,8 @@ Reflection straight_reflection(Vertex met, Light light)
   reflection.straight *= mirrored;
   reflection.grazing *= mirrored;
 #endif
-#ifdef GLASS_SHEETS
-  if (met.within && LIGHT_IS(light, LIGHT_DIRECTION)) {
+#if defined(GLASS_SHEETS) && defined(SHEETS_FIND_SKY)
+  if (met.within && LIGHT_IS(light, LIGHT_DIRECTION) && (light.flags & LIGHT_GLASS_BLOCKS) == 0) {
     reflection.straight = reflection.grazing = vec3(0.0);
   }
 #endif
@@ -517,14 +521,12 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
     }
     if (total > DARK && chosen_share > 0.0) {
       Light light = light_read(chosen);
-      float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
-        chosen_light *= layers_color(1e30);
+        chosen_light *= light_passing(light, origin, chosen_direction, salt + uint(chosen));
       }
       chosen_light *= passing_media(origin, chosen_direction, light_distance(light, origin, chosen_direction), salt);
       sum += chosen_light * reflection_of(straight_reflection(met, light), normal, chosen_direction, viewer)
-             * (visibility * total / chosen_share);
+             * (total / chosen_share);
     }
   }
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.

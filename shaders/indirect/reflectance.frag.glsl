@@ -9,14 +9,14 @@
 #include "indirect/albedo.glsl"
 
 // 1 for glass and mirrors of a material that throws caustics (`mirrors`): photons bring their light where a technique owns it.
-// `alpha`: of the mirror; -1 where it is too rough for paths to go on from it.
+// `alpha`: of the mirror.
 float mirrors_photons(Surface s, Reflection r, out float alpha)
 {
   bool glass = s.kind == LOBE_REFRACTION;
   bool mirror = mirrors != 0 && s.kind < LOBE_REFRACTION && luminance(r.grazing) > 0.0 && s.glossy_roughness <= THROWS
                 && luminance(r.straight) >= luminance(r.diffuse);
   vec2 alphas = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
-  alpha = !mirror ? 0.0 : (s.glossy_roughness <= SMOOTH) ? sqrt(alphas.x * alphas.y) : -1.0;
+  alpha = mirror ? sqrt(alphas.x * alphas.y) : 0.0;
   return (mirror || glass) ? 1.0 : 0.0;
 }
 

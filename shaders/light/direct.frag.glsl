@@ -202,7 +202,7 @@ void main()
 #endif
         visibility = light_visibility(light, pixel, start, facing);
 #if defined(OWN_POINTS) || defined(LAYERS)
-        vec3 layers = layers_color(1e30);  // that the ray has passed
+        vec3 layers = layers_color(light_distance(light, s.position, towards));  // that the ray has passed
         from_diffuse *= layers;
         from_glossy *= layers;
 #endif

@@ -83,7 +83,7 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
                  && trace_layers(origin, kept_direction, reach, reach, salt, true, true, hit) < reach;
   float through = min(light_distance(light, origin, kept_direction), FARTHEST_MEDIUM);
-  kept_light *= blocked ? vec3(0.0) : layers_color(1e30) * media_transmittance(origin, kept_direction, through, salt);
+  kept_light *= blocked ? vec3(0.0) : layers_color(reach) * media_transmittance(origin, kept_direction, through, salt);
   return blocked ? vec3(0.0) : kept_light * (total / kept_importance);
 }
 

@@ -253,6 +253,29 @@ def test_bounced_light_is_absorbed_in_glass_that_it_passes(stage):
     assert found[1] / found[0] == pytest.approx(np.array(expected), rel=0.05)
 
 
+def test_light_of_a_lamp_in_glass_is_absorbed_on_its_way_out(stage):
+    """In the middle of a wide slab: all light of the floor and the wall far below it has passed half of that, and the
+    quotients of its colours say by what. Rays that end in the slab lost nothing there."""
+    per_metre, thick, found = np.array((2.0, 0.5, 0.0)), 0.4, []
+    for filled in (False, True):
+        stage.clear()
+        stage.scene.candela.slot_caustics = "OFF"
+        stage.rectangle((-0.5, -0.5), (0.5, 0.5), material=stage.diffuse(0.8))
+        stage.rectangle(
+            (-0.5, 0), (0.5, 1.0), material=stage.diffuse(0.8), location=(0, 0.5, 0), turn=(np.pi / 2, 0, 0)
+        )
+        stage.light("POINT", (0, 0, 20.0), energy=1e5, shadow_soft_size=0.0)
+        if filled:
+            glass = absorbing_glass(stage, per_metre, ior=1.2)
+            box(stage, glass, (-9, -9, 20.0 - thick), (9, 9, 20.0 + thick))
+        camera = stage.camera((0, -3, 0.5), (np.pi / 2, 0, 0))
+        camera.data.type, camera.data.ortho_scale = "ORTHO", 0.9
+        found.append(stage.render(4, (8, 8), bounces=1)["diffuse_indirect"][..., :3].mean((0, 1)))
+    passed = found[1] / found[0]
+    assert passed[2] > 0.5
+    assert passed / passed[2] == pytest.approx(np.exp(-per_metre * thick), rel=0.02)
+
+
 def test_bounced_light_passes_a_thin_wall_in_its_base_colour(stage):
     """Two faces with what they mirror to and fro, and the base colour by the way between them."""
     base, ior = np.array(COLOR), 1.5

@@ -13,7 +13,7 @@ from addon.frame.settings import Settings
 from addon.gfx import images
 from addon.lighting import probes
 from addon.sampling.sequence import point
-from addon.surfaces.reflectance import BANDS, COLUMNS, Reflectance
+from addon.surfaces.reflectance import BANDS, COLUMNS, MIRRORS, SKY_ROWS, Reflectance
 from addon.techniques.instant_radiosity import DEEPER, InstantRadiosity, deeper_weight
 from tests.numerics import trapezoid
 
@@ -353,7 +353,7 @@ def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_
     stage.render(1)
     frame = stage.renderer.frame
     assert len(frame.materials.compiled) == 2
-    used = images.pool.take(COLUMNS, BANDS, "RGBA32F")
+    used = images.pool.take(COLUMNS, BANDS + SKY_ROWS, "RGBA32F")
     images.Target((used,)).clear((7.0, 7.0, 7.0, 7.0))
     images.pool.give(used)
     means = Reflectance()
@@ -382,6 +382,27 @@ def test_mean_of_a_mirror_among_other_lobes_keeps_the_width_of_the_mirror(stage,
     assert 0.55 < share < 0.85
     assert alpha / share == pytest.approx(0.04, rel=0.01)
     means.release()
+
+
+def test_some_places_of_metal_that_are_rougher_do_not_end_its_mirror(stage, gpu_context):
+    """Of two lobes of metal of roughness .1 and .4 a tenth of the pixels keep the rougher one: mean alpha .025."""
+    material = stage.material("ShaderNodeMixShader", Fac=0.1)
+    tree = material.node_tree
+    for place, roughness in ((1, 0.1), (2, 0.4)):
+        lobe = tree.nodes.new("ShaderNodeBsdfAnisotropic")
+        lobe.inputs["Roughness"].default_value = roughness
+        tree.links.new(lobe.outputs[0], tree.nodes["Mix Shader"].inputs[place])
+    stage.floor(material=material)
+    stage.camera_above(4.0)
+    stage.render(1)
+    means = Reflectance()
+    means.update(stage.renderer.frame)
+    found = images.read(means.image)
+    share, alpha = found[0, 1, 3], found[1, 1, 3]
+    means.release()
+    print(f"{share:.3f} {alpha:.4f}")
+    assert share == pytest.approx(1.0, abs=0.01)
+    assert 0.01 < alpha < 0.04 and alpha <= float(dict(MIRRORS)["SMOOTH_MIRRORS"]) * share
 
 
 @pytest.mark.parametrize(("samples", "whole"), [(1, True), (3, True), (64, False), (4, True), (30, True), (64, True)])

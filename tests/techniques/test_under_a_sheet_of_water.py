@@ -6,6 +6,7 @@ import pytest
 from mathutils import Matrix
 
 from addon.compare.passes import light_paths
+from addon.gfx.library import resolve
 from addon.materials.energy import pane_passing
 from tests.techniques.test_image_space_subsurface import scattering, slab
 
@@ -107,3 +108,15 @@ def test_the_middle_of_a_round_pool_has_the_sky_that_comes_in_beside_it(stage):
     light = sum(paths[name].mean() for name in ("diffuse_direct", "diffuse_indirect"))
     print(f"{light:.4f}, closed form {expected:.4f}")
     assert light == pytest.approx(expected, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("file", "finds"),
+    [("indirect/near", True), ("indirect/candidates", True), ("hits/bounced", True), ("ssdo/bounce", False)],
+)
+def test_points_of_the_world_are_left_out_at_sheets_where_rays_find_it_alone(file, finds):
+    """Screen-space bounces send no rays that a sheet mirrors: they lost the world seen from below it."""
+    text, _ = resolve(f"{file}.frag.glsl", {})
+    defined, asked = text.find("#define SHEETS_FIND_SKY"), text.find("defined(SHEETS_FIND_SKY)")
+    assert asked > 0 and (0 <= defined < asked) == finds
+    assert ("* wide_sky(" in text) == finds
