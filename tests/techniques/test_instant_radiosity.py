@@ -358,8 +358,9 @@ def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_
     images.pool.give(used)
     means = Reflectance()
     means.update(frame)
-    of_all = images.read(means.image)[0, :, :3]
-    assert means.image is used
+    found = images.read(means.image)
+    of_all = found[0, :, :3]
+    assert means.image is used and not found[-SKY_ROWS:].any()  # the world's rows, which nothing here shows
     assert of_all[1] == pytest.approx(0.5, rel=0.01) and not of_all[0].any() and not of_all[2:].any()
     means.release()
 
