@@ -36,12 +36,19 @@ vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, flo
   return sum * arriving;
 }
 
+// Whether glass stops rays to a light's points: what passes it arrives in another way.
+bool stops_at_glass(Receiver r, Light light)
+{
+  return r.bends || r.within || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
+}
+
 // What emissive triangles close by bring that their points leave out; a lobe that a ray follows finds them by that.
 vec3 light_close_by(Receiver r, Light light, uint salt)
 {
   vec3 side = r.surface.geometric_normal;
   vec3 direction;
-  vec3 arriving = emission_close_by(light, ray_origin(r.surface.position, side), r.surface.normal, salt, direction);
+  vec3 origin = ray_origin(r.surface.position, side);
+  vec3 arriving = emission_close_by(light, origin, r.surface.normal, stops_at_glass(r, light), salt, direction);
   if (max_component(abs(arriving)) <= 0.0 || dot(direction, side) <= 0.0) {
     return vec3(0.0);
   }
@@ -105,7 +112,7 @@ vec3 light_of_points(Receiver r, uint salt, out int emissive)
 #endif
   float reach = light_reach(light, origin, chosen_direction);
   ivec2 hit;
-  bool glass_stops = r.bends || r.within || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
+  bool glass_stops = stops_at_glass(r, light);
   bool looks = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0;
   bool blocked = looks && trace_layers(origin, chosen_direction, reach, reach, salt, glass_stops, true, hit) < reach;
   chosen_light *= looks ? layers_color(reach) : vec3(1.0);

@@ -456,8 +456,8 @@ Reflection straight_reflection(Vertex met, Light light)
 // What emissive triangles close to a place bring that their points leave out: one at distance d counts min(1, d2 / least)
 // of its light (light_sample), so that a thin lamp on a shelf would light hardly anything of that. A cosine-distributed
 // ray meets them: one at distance d counts the rest. `light`: one of this sample's points, of which all share what they are
-// drawn by. Returns irradiance over PI, from where the ray comes.
-vec3 emission_close_by(Light light, vec3 origin, vec3 normal, uint salt, out vec3 direction)
+// drawn by; `glass_stops`: as it does the rays to those. Returns irradiance over PI, from where the ray comes.
+vec3 emission_close_by(Light light, vec3 origin, vec3 normal, bool glass_stops, uint salt, out vec3 direction)
 {
   uvec3 bits = hash3(uvec3(salt, 61u, 7u));
   direction = cosine_direction(normal, vec2(to_unit(bits.x), to_unit(bits.y)));
@@ -465,7 +465,6 @@ vec3 emission_close_by(Light light, vec3 origin, vec3 normal, uint salt, out vec
   float spread = light_least(light) * light.area * emissive_density(light.radiance, level);  // the same of all points
   float reach = sqrt(spread / max(level, 1e-30));
   ivec2 hit;
-  bool glass_stops = (light.flags & LIGHT_GLASS_BLOCKS) != 0;  // as it does rays to those points
   float t = trace_layers(origin, direction, reach, 0.0, bits.z, glass_stops, false, hit);
   if (t >= reach) {
     return vec3(0.0);
@@ -533,7 +532,7 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
   for (; emissive >= 0 && all_linked; emissive = -1) {
     Light light = light_read(emissive);
     vec3 direction;
-    vec3 arriving = emission_close_by(light, origin, normal, salt, direction);
+    vec3 arriving = emission_close_by(light, origin, normal, false, salt, direction);
     float above = dot(direction, met.lit);
     arriving *= (above > 0.0) ? left * ((bump > 0.0) ? bump_dimming(bump, max(above, 1e-6)) : 1.0) : 0.0;
     sum += PI * arriving * reflection_of(straight_reflection(met, light), normal, direction, viewer);
