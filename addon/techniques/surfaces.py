@@ -50,6 +50,7 @@ from ..surfaces.draw import (
     OPAQUE,
     STOCHASTIC,
     SURFACES,
+    StandIns,
     draw_sample,
     draw_surfaces,
     draw_view,
@@ -96,6 +97,8 @@ class Surfaces(Technique):
 
     def __init__(self):
         self._drawn = False  # `begin` has left the first sample in the images
+        # Programs that had a first draw and are fresh still: of their boxes a view sees something, of their parts none.
+        self._tried: set[library.Program] = set()
 
     def begin(self, frame: Frame) -> Iterator[None]:
         yield from self._first_draws(frame)
@@ -133,21 +136,25 @@ class Surfaces(Technique):
             draw_sample(frame, self, self._target(frame))
 
     def _first_draws(self, frame: Frame) -> Iterator[None]:
-        """In a viewport, draw each program of materials that has never been drawn with in a part of its own: that takes
-        some drivers as long as to compile it. What is drawn is not used."""
+        """In a viewport, draw each program of materials in view that has never been drawn with in a part of its own,
+        once: that takes some drivers as long as to compile it. What is drawn is not used."""
         schedule = frame.settings.schedule
         if not (schedule.is_draft or schedule.shows_each) or frame.snapshot.baked is not None or frame.tiles:
             return
         sharing: dict[library.Program, set[int]] = {}
-        for material in {draw.material for draw in frame.geometry.draws}:
+        seen = np.flatnonzero(frame.geometry.boxes.seen(frame.view_rows))
+        for material in {frame.geometry.draws[k].material for k in seen}.difference(frame.shared(StandIns).of):
             if not frame.materials.compiled[material].bounds_alone:
                 sharing.setdefault(frame.materials.surface_program(material), set()).add(material)
-        fresh = [materials for program, materials in sharing.items() if not library.has_drawn(program)]
+        fresh = {program: materials for program, materials in sharing.items() if not library.has_drawn(program)}
+        self._tried &= fresh.keys()
+        left = [program for program in fresh if program not in self._tried]
         constants = drawing_constants(STOCHASTIC, lobes_kept(frame))
-        for materials in fresh[1:]:  # the first one in the picture's own draw
+        for program in left[1:]:  # the first one in the picture's own draw
             target, program_of = self._target(frame), frame.materials.surface_program
             target.clear()
-            draw_view(frame, self, target, frame.view_block, frame.view_rows, program_of, materials, constants)
+            draw_view(frame, self, target, frame.view_block, frame.view_rows, program_of, fresh[program], constants)
+            self._tried.add(program)
             yield
 
     @staticmethod

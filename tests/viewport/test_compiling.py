@@ -13,6 +13,7 @@ from addon.frame import device_probe
 from addon.gfx import device, images, library
 from addon.scene.view import View
 from addon.surfaces.first_look import HEADLIGHT, FirstLook
+from addon.techniques import surfaces
 from addon.ui import ENGINE
 from addon.ui.properties import settings_of
 from tests.viewport.region import SIZE, Region
@@ -83,6 +84,31 @@ def test_programs_come_in_over_many_redraws_and_the_picture_is_that_of_warm_ones
     expected = warm.rest()
     warm.viewport.release()
     np.testing.assert_array_equal(images.read(cold.viewport.picture), expected)
+
+
+def test_only_programs_in_view_have_first_draws_and_each_has_one(scene, monkeypatch):
+    """Those of what stands behind the camera wait until a view sees it."""
+    for k, kind in enumerate(("Wave", "Voronoi", "Magic", "Checker")):
+        material = material_named(kind)
+        nodes = material.node_tree.nodes
+        texture = nodes.new(f"ShaderNodeTex{kind}")
+        material.node_tree.links.new(texture.outputs["Color"], nodes["Principled BSDF"].inputs["Base Color"])
+        bpy.ops.mesh.primitive_cube_add(size=0.5, location=(0.8 * k, -1.5, 0.3) if k < 2 else (8, -10 - k, 4))
+        bpy.context.object.data.materials.append(material)
+    drawn, draw_view = [], surfaces.draw_view
+
+    def noted(frame, technique, target, block, rows, program_of, materials, constants):
+        drawn.append({frame.snapshot.materials[k].name for k in materials})
+        draw_view(frame, technique, target, block, rows, program_of, materials, constants)
+
+    monkeypatch.setattr(surfaces, "draw_view", noted)
+    region = Region()
+    for _ in range(6):
+        region.camera = region.moved(1e-3)
+        region.draw()
+    region.rest()
+    assert 1 <= len(drawn) <= 2 and not set().union(*drawn) & {"Magic", "Checker"}
+    region.viewport.release()
 
 
 @pytest.mark.slow
