@@ -278,3 +278,21 @@ def test_mirrors_show_what_a_light_leaves_out_in_the_dark(room):
     room.lamp.light_linking.receiver_collection = collection([wall], "EXCLUDE")
     seen.append(room.render(2, (16, 12), bounces=1)["glossy_indirect"].max())
     assert seen[0] > 0.01 and seen[1] == 0.0
+
+
+def test_a_mirror_shows_a_board_dark_that_a_lamp_touching_it_leaves_out(room):
+    """Rays that look for emissive triangles close to what a mirror shows would not tell which mesh they meet."""
+    for one in (*room.scene.objects,):
+        bpy.data.objects.remove(one)
+    shining = room.material("ShaderNodeEmission", Strength=100.0)
+    lamp = room.mesh([(-1, 0, 1), (1, 0, 1), (1, 0, 0.99), (-1, 0, 0.99)], [(0, 1, 2, 3)], material=shining)
+    corners = [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]
+    board = room.mesh(corners, [(0, 1, 2, 3)], material=room.diffuse(1.0))
+    room.rectangle((-1, -1), (1, 1), material=room.principled(Metallic=1.0, Roughness=0.0))
+    camera = room.camera((0, 0, 0.5), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.2
+    seen = []
+    for links in (None, collection([board], "EXCLUDE")):
+        lamp.light_linking.receiver_collection = links
+        seen.append(room.render(4, (12, 12), bounces=1)["glossy_indirect"][5:7, :, :3].mean())
+    assert seen[0] > 0.5 and seen[1] == 0.0
