@@ -252,7 +252,7 @@ class VirtualLights:
     def path_bindings(self, frame: Frame) -> dict:
         """What shaders/indirect/path.glsl needs: textures, blocks and constants of this sample."""
         hierarchy, reflectance = frame.hierarchy("diffuse"), frame.kept(Reflectance)
-        if hierarchy.has_sheets:
+        if hierarchy.has_sheets or reflectance.mirrors_glass:
             bright, seen = bright_world(frame), frame.snapshot.world.visibility.diffuse
             reflectance.show_sky(frame.environment, (bright.threshold if bright else np.inf) if seen else -1.0)
         return {

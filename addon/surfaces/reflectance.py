@@ -46,8 +46,9 @@ REFLECTANCE = passes.fullscreen_program(
 # For programs that read the image where a technique brings what mirrors and glass throw on diffuse surfaces.
 MIRRORS_OWNED = (("MIRRORS_OWNED", "1"),)
 TURNED = (("TURNED_NORMALS", "1"),)  # where a material turns normals
-# Where a material is smooth metal: up to this mean of the mirror's alpha.
+# Where a material is smooth metal or glass: up to this mean of the mirror's alpha.
 MIRRORS = (("SMOOTH_MIRRORS", f"{(gloss.SMOOTH + 1e-4) ** 2:.6f}"),)
+GLASS_MIRRORS = (("GLASS_MIRRORS", "1"),)  # where one is smooth glass
 MIRRORS_DROPPED = (("MIRRORS_DROPPED", "1"),)  # where Blender's Reflective Caustics are off
 MATT = (("MATT", "1"),)  # where all materials are diffuse, and programs hold what a scene needs
 TURNING = ("ShaderNodeNormalMap", "ShaderNodeBump")
@@ -120,6 +121,11 @@ class Reflectance:
             constants={"extent": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE, "mirrors": mirrors},
         )
 
+    @property
+    def mirrors_glass(self) -> bool:
+        """Whether rays go on by the mirrors of smooth glass."""
+        return set(GLASS_MIRRORS) <= set(self._defines)
+
     def show_sky(self, environment: Environment, most: float) -> None:
         """Put the world's wide light above the bands, for rays that sheets of glass mirror: without what is of more
         luminance than `most`, W / (m2 sr)."""
@@ -174,6 +180,12 @@ def smooth_metal(frame: Frame, material: int, most: float = gloss.SMOOTH) -> boo
     return min(gloss.mirrors(frame.snapshot.materials[material].graph), default=1.0) <= most
 
 
+def mirrors_as_glass(frame: Frame, material: int) -> bool:
+    """Whether it is smooth glass, which stops rays by chance and mirrors those."""
+    glass = frame.materials.compiled[material].glass
+    return glass is not None and glass.fresnel and glass.roughness <= gloss.SMOOTH
+
+
 def keys_of(frame: Frame) -> dict[int, object]:
     """By material that is shown: what its overview depends on."""
     prints, count = frame.materials.fingerprint(), len(frame.materials.compiled)
@@ -222,8 +234,9 @@ def _values(view: dict) -> dict:
 def _defines(frame: Frame) -> tuple[tuple[str, str], ...]:
     """What programs that read the image need, by what the materials do that are shown."""
     used, snapshot = frame.snapshot.used_materials, frame.snapshot
-    mirrors = MIRRORS if any(smooth_metal(frame, k) for k in used) else ()
+    glass = GLASS_MIRRORS if any(mirrors_as_glass(frame, k) for k in used) else ()
+    mirrors = MIRRORS if glass or any(smooth_metal(frame, k) for k in used) else ()
     dropped = () if snapshot.film.caustics_reflective else MIRRORS_DROPPED
     turned = any(node.type in TURNING for k in used for node in snapshot.materials[k].graph.nodes.values())
     shines = to_hold(frame.materials.glossy or frame.materials.soft, True)
-    return (*mirrors, *dropped, *(TURNED if turned else ()), *(() if shines else MATT))
+    return (*mirrors, *glass, *dropped, *(TURNED if turned else ()), *(() if shines else MATT))

@@ -38,10 +38,13 @@ void main()
   vec3 throughput = vec3(1.0);
   bool in_glass = false;    // of the last surface (Vertex)
   bool mirrored = false;    // the path goes on by a mirror
-  bool from_sheet = false;  // by a sheet of glass, from within
+  bool from_glass = false;  // such that rays find lights
+#ifdef GLASS_MIRRORS
+  Vertex mirror;            // that glass
+#endif
   // The first surface and the next ones by the same calls: compilers hold the code of each.
   int most = max(bounces, 1);
-  for (int bounce = 1; (bounce <= most || from_sheet) && max_component(throughput) > 1e-4; bounce++) {
+  for (int bounce = 1; (bounce <= most || from_glass) && max_component(throughput) > 1e-4; bounce++) {
     if (bounce > 1) {
       roll = hash3(roll);
       vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));
@@ -76,15 +79,14 @@ void main()
       in_glass = met.in_glass;
       origin = ray_origin(lit_position(met), met.lit);
     }
-    if (!trace_vertex(origin, direction, 1e29, 0.0, in_glass, roll.z, met, t)) {
-#ifdef GLASS_SHEETS
-      vec3 passing = met.passed * passing_media(origin, direction, FARTHEST_MEDIUM, roll.y);
-      later += from_sheet ? throughput * passing * wide_sky(direction) : vec3(0.0);
+    bool meets = trace_vertex(origin, direction, 1e29, 0.0, in_glass, roll.z, met, t);
+#ifdef GLASS_MIRRORS
+    for (; from_glass; from_glass = false) {
+      later += throughput * met.passed * mirrored_lights(mirror, origin, direction, meets ? t : 1e29, roll.y);
       later_shorter = (bounce <= bounces) ? later : later_shorter;
-#endif
-      break;
     }
-    if (bounce > most) {
+#endif
+    if (!meets || bounce > most) {
       break;
     }
     if (bounce > 1) {
@@ -116,8 +118,12 @@ void main()
     // The roll after this one is the onward direction's.
     mirrored = bounce > 1 && mirror_drawn(met, -direction, to_unit(hash3(roll ^ uvec3(0x9E3779B9u)).x), true);
 #endif
-#ifdef GLASS_SHEETS
-    from_sheet = mirrored && met.within;
+#ifdef GLASS_MIRRORS
+#ifdef MIRRORS_DROPPED
+    met.by_rays = 0.0;  // elsewhere rays of the picture's surfaces find the first one's (indirect/near.glsl)
+#endif
+    from_glass = mirrored && (met.within || met.by_rays > 0.0);
+    mirror = met;
 #endif
     vec3 sent = direct_reflected(met, -direction, (bounce == 1) ? 4 : 1, roll.x);
     if (bounce == 1) {

@@ -53,22 +53,25 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
   bool from_seen = walk.bounce == 1 && (!walk.whole || walk.soft);  // from a surface of the picture, over smooth metal alone
   bool from_gloss = walk.bounce == 1 && walk.gloss;  // from such a lobe, over glass alone
   bool farther = false;                              // a surface has sent light along the walk by virtual lights
-  bool from_sheet = false;                           // a sheet of glass has mirrored it, from within
-  for (; walk.bounce <= bounces || from_sheet; walk.bounce++) {
+  bool from_glass = false;                           // glass has mirrored it, such that rays find lights
+#ifdef GLASS_MIRRORS
+  Vertex mirror;  // that glass
+#endif
+  for (; walk.bounce <= bounces || from_glass; walk.bounce++) {
     float share = 1.0;
     bool mirrored = false;
     if (!walk.has_met) {
       float t;
       float limit = walk.whole ? 1e29 : reach;
       float last_mirror = mirror_limit(walk.origin, walk.direction);
-      if (!trace_vertex(walk.origin, walk.direction, limit, last_mirror, walk.in_glass, roll.z, walk.met, t)) {
-#ifdef GLASS_SHEETS
-        vec3 passing = walk.met.passed * passing_media(walk.origin, walk.direction, FARTHEST_MEDIUM, roll.y);
-        sum += from_sheet ? throughput * passing * wide_sky(walk.direction) : vec3(0.0);
-#endif
-        break;
+      bool meets = trace_vertex(walk.origin, walk.direction, limit, last_mirror, walk.in_glass, roll.z, walk.met, t);
+#ifdef GLASS_MIRRORS
+      for (; from_glass; from_glass = false) {
+        float end = meets ? t : 1e29;
+        sum += throughput * walk.met.passed * mirrored_lights(mirror, walk.origin, walk.direction, end, roll.y);
       }
-      if (walk.bounce > bounces) {
+#endif
+      if (!meets || walk.bounce > bounces) {
         break;
       }
       share = walk.whole ? 1.0 : max(1.0 - t * t / (reach * reach), 0.0);
@@ -109,8 +112,9 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       walk.direction = mirror_sample(walk.met, -walk.direction, vec2(to_unit(roll.x), to_unit(roll.y)), reflected);
       throughput *= reflected;
       walk.origin = ray_origin(walk.met.position, walk.met.normal);
-#ifdef GLASS_SHEETS
-      from_sheet = walk.met.within;
+#ifdef GLASS_MIRRORS
+      from_glass = walk.met.within || walk.met.by_rays > 0.0;
+      mirror = walk.met;
 #endif
       continue;
     }
@@ -135,7 +139,7 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
       farther = true;
     }
     from_seen = walk.bounce == 0;
-    from_gloss = from_sheet = false;
+    from_gloss = from_glass = false;
     roll = hash3(roll);
     vec3 reflected;
     vec2 u = vec2(to_unit(roll.x), to_unit(roll.y));

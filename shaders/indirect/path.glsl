@@ -13,9 +13,14 @@
 #include "ask/media.glsl"
 #include "ask/leaving.glsl"
 
-#if defined(GLASS_SHEETS) && !defined(SMOOTH_MIRRORS)
-#define SMOOTH_MIRRORS 0.0  // up to this alpha; sheets of glass mirror from within
+#if defined(GLASS_SHEETS) && !defined(GLASS_MIRRORS)
+#define GLASS_MIRRORS  // sheets of glass mirror from within
 #endif
+#if defined(GLASS_MIRRORS) && !defined(SMOOTH_MIRRORS)
+#define SMOOTH_MIRRORS 0.0  // up to this alpha
+#endif
+#define MOST_MIRRORED 4.0    // of lamps' light along one ray, over what even light has in the mean
+#define WIDE 0.05            // solid angle of a light, sr, from which on rays that glass mirrors find it without grain
 #define LAYERS_PASSED 16     // surfaces that a ray to a light goes through that they do not block
 
 struct Vertex {
@@ -46,8 +51,9 @@ struct Vertex {
   vec3 mirror_normal;
   vec3 mirror_share;
 #endif
-#ifdef GLASS_SHEETS
-  bool within;  // a sheet of glass from within
+#ifdef GLASS_MIRRORS
+  bool within;     // a sheet of glass from within
+  float by_rays;   // share of what it mirrors of lamps that rays find (found_by_rays); 0 where none look for them
 #endif
 };
 
@@ -179,6 +185,9 @@ float sheet_mirrors(ivec2 hit, float cosine)
   return fresnel_dielectric(cosine, ior) / max(1.0 - leaving, 1e-3);
 }
 
+#endif
+
+#ifdef GLASS_MIRRORS
 // Radiance of the world's wide light: that which does not arrive as photons.
 vec3 wide_sky(vec3 direction)
 {
@@ -198,6 +207,10 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
   met.mirror_alpha = -1.0;
   met.mirror_normal = met.normal;
   met.mirror_share = vec3(0.0);
+#ifdef GLASS_MIRRORS
+  met.within = false;
+  met.by_rays = 0.0;
+#endif
 #ifdef GLASS_SHEETS
   // From below a sheet of water rays pass with the chance that even light from there leaves it. What it mirrors of those that
   // it stops goes by Fresnel's reflectance: most by total reflection.
@@ -218,6 +231,29 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
     vec3 smooth_normal = triangle_shading_normal(hit, met.position);
     smooth_normal = (dot(smooth_normal, met.normal) < 0.0) ? -smooth_normal : smooth_normal;
     met.mirror_normal = (dot(smooth_normal, direction) < 0.0) ? smooth_normal : met.normal;
+#ifdef GLASS_MIRRORS
+    // Glass stops rays with the chance that Fresnel's reflectance has in the mean over even light, and mirrors those by
+    // that at their angle over the mean. Beside other closures no mirror is known apart.
+    float ior = reflectance_fetch(place + ivec2(0, 6 * (reflectance_size().y / REFLECTANCE_BANDS))).a;
+    for (bool glass = triangle_is_glass(hit); glass; glass = false) {
+      if (ior <= 0.0 || max_component(met.reflection.diffuse) > 0.0) {
+        met.mirror_alpha = -1.0;
+        break;
+      }
+      ior = max(ior, 1.0 / ior);
+      float mean = fresnel_average_dielectric(ior);
+      float cosine = -dot(met.mirror_normal, direction);
+      // The material's means are over the chance that it has at their view.
+      float less = fresnel_dielectric(0.577, ior) / mean;
+      met.reflection.straight *= less;
+      met.reflection.grazing *= less;
+      vec3 albedo = reflectance_fetch(ivec2(material & 15, material >> 4)).rgb;
+      vec3 lobe = mix(met.reflection.straight, met.reflection.grazing, pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0));
+      met.mirror_share = albedo * (fresnel_dielectric(cosine, ior) / mean) / max(lobe, vec3(1e-6));
+      // At grazing angles few rays would bring much each: the lobe sends what is more than MOST_MIRRORED of even light.
+      met.by_rays = min(MOST_MIRRORED * mean / max(fresnel_dielectric(cosine, ior), 1e-6), 1.0);
+    }
+#endif
   }
 }
 
@@ -262,6 +298,9 @@ bool mirror_drawn(inout Vertex met, vec3 viewer, float u, bool to_rough)
   met.reflection.diffuse *= drawn ? 0.0 : scale;
   met.reflection.straight *= drawn ? scale : 0.0;
   met.reflection.grazing *= drawn ? scale : 0.0;
+#ifdef GLASS_MIRRORS
+  met.by_rays = drawn ? met.by_rays : 0.0;
+#endif
   return drawn;
 }
 #endif
@@ -429,6 +468,53 @@ bool light_maps(Light light)
 }
 #endif
 
+#ifdef GLASS_MIRRORS
+// Whether rays from here that glass mirrors find this light in place of the glass's lobe: where no photons bring it and it
+// is wide, or the world's.
+bool found_by_rays(Light light, vec3 position)
+{
+#ifdef MIRRORS_OWNED
+  bool answered = (light.flags & LIGHT_GLASS_BLOCKS) != 0;
+#else
+  bool answered = false;
+#endif
+  if (answered || (!LIGHT_IS(light, LIGHT_DIRECTION) && ((light.flags & LIGHT_SHADOW) == 0 || light.first_view != 0))) {
+    return false;
+  }
+  vec3 away = light.centre - position;
+  float squared = dot(away, away);
+  bool flat_area = LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE);
+  bool ball = LIGHT_IS(light, LIGHT_SPHERE) || LIGHT_IS(light, LIGHT_POINT);
+  return LIGHT_IS(light, LIGHT_DIRECTION) || (LIGHT_IS(light, LIGHT_SUN) && light.area > WIDE)
+         || (flat_area && light.area > WIDE * squared) || (ball && PI * light.radius * light.radius > WIDE * squared);
+}
+
+// Radiance along a ray that glass has mirrored from lamps nearer than the next surface, at `limit`, and where there is none
+// of the world's wide light. `mirror`: the glass.
+vec3 mirrored_lights(Vertex mirror, vec3 origin, vec3 direction, float limit, uint salt)
+{
+  vec3 sum = vec3(0.0);
+  if (limit >= 1e29) {
+    sum = wide_sky(direction) * passing_media(origin, direction, FARTHEST_MEDIUM, salt);
+  }
+  for (int i = 0; i < light_count && mirror.by_rays > 0.0; i++) {
+#ifdef HIT_LINKS
+    if (((int(sources.light[i * LIGHT_TEXELS].x) >> 4 >> mirror.group) & 1) != 0) {
+      continue;
+    }
+#endif
+    Light light = light_read(i);
+    float hit_distance;
+    float density;
+    vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
+    if (max_component(radiance) > 0.0 && hit_distance < limit && found_by_rays(light, mirror.position)) {
+      sum += radiance * mirror.by_rays * passing_media(origin, direction, hit_distance, salt);
+    }
+  }
+  return sum;
+}
+#endif
+
 // What reflects light straight from this source: not the lobe where photons bring what that mirrors, nor, where rays that a
 // sheet of glass mirrors find the world (SHEETS_FIND_SKY), of that what wide_sky has.
 Reflection straight_reflection(Vertex met, Light light)
@@ -445,10 +531,13 @@ Reflection straight_reflection(Vertex met, Light light)
   reflection.straight *= mirrored;
   reflection.grazing *= mirrored;
 #endif
-#if defined(GLASS_SHEETS) && defined(SHEETS_FIND_SKY)
-  if (met.within && LIGHT_IS(light, LIGHT_DIRECTION) && (light.flags & LIGHT_GLASS_BLOCKS) == 0) {
-    reflection.straight = reflection.grazing = vec3(0.0);
-  }
+#if defined(GLASS_MIRRORS) && defined(SHEETS_FIND_SKY)
+  bool of_world = LIGHT_IS(light, LIGHT_DIRECTION);
+  bool found = met.within && of_world && (light.flags & LIGHT_GLASS_BLOCKS) == 0;
+  found = found || (met.by_rays > 0.0 && found_by_rays(light, met.position));
+  float left = !found ? 1.0 : of_world ? 0.0 : 1.0 - met.by_rays;
+  reflection.straight *= left;
+  reflection.grazing *= left;
 #endif
   return reflection;
 }

@@ -2,8 +2,8 @@
 // above the other, all of it, with `mirrors_photons`, its diffuse part, with that times the mirror's own alpha, and of its
 // lobe the reflectance at normal incidence, with alpha, and at grazing incidence, with the roughness of the diffuse part.
 // Then three for how normal maps and bumps turn normals n to n + d: rows of the mean of d n^T, with the diagonal of that
-// of n n^T, and the latter's yz, zx, xy. Both are the same from behind. Last, what of the diffuse part passes to the other
-// side.
+// of n n^T, and the latter's yz, zx, xy, with a dielectric's index of refraction. Both are the same from behind. Last, what
+// of the diffuse part passes to the other side.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
@@ -37,7 +37,7 @@ void main()
         float alpha;
         float photons = mirrors_photons(s, r, alpha);
         sum += (band > 7) ? vec4(r.through * r.diffuse, 0.0)
-             : (band > 6) ? vec4(base.yzx * base.zxy, 0.0)
+             : (band > 6) ? vec4(base.yzx * base.zxy, (s.kind == FRESNEL_DIELECTRIC) ? s.glossy_ior : 0.0)
              : (band > 3) ? vec4(moved[band - 4] * base, base[band - 4] * base[band - 4])
              : (band == 0) ? vec4(surface_albedo(s, view_cosine), photons)
              : (band == 1) ? vec4(r.diffuse, photons * alpha)

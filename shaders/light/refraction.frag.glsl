@@ -265,8 +265,9 @@ void main()
 #ifdef SMOOTH_MIRRORS
       rest.met.mirror_alpha = -1.0;
 #endif
-#ifdef GLASS_SHEETS
+#ifdef GLASS_MIRRORS
       rest.met.within = false;
+      rest.met.by_rays = 0.0;
 #endif
       out_indirect.rgb += throughput * radiance_along(rest, glossy_radius, roll);
       break;

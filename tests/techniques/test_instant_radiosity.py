@@ -16,6 +16,7 @@ from addon.sampling.sequence import point
 from addon.surfaces.reflectance import BANDS, COLUMNS, MIRRORS, SKY_ROWS, Reflectance
 from addon.techniques.instant_radiosity import DEEPER, InstantRadiosity, deeper_weight
 from tests.numerics import trapezoid
+from tests.techniques.foggy_stage import box
 
 SAMPLES = 32
 
@@ -521,3 +522,34 @@ def test_probes_stand_on_the_surface_that_is_seen_one_in_each_cell(stage, render
         assert np.linalg.svd(apart, compute_uv=False)[-1] / len(stand) ** 0.5 < 1e-5
         between = np.linalg.norm(stand[:, None] - stand, axis=2) + np.eye(len(stand))
         assert between.min() > 1e-3
+
+
+def pane(stage):
+    """A solid pane of glass that stands on the floor."""
+    glass = stage.material("ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), IOR=1.5, Roughness=0.0)
+    box(stage, glass, (-1, 0, 0.001), (1, 0.05, 1.0))
+
+
+def test_a_pane_mirrors_a_wide_lamp_onto_the_floor_at_its_foot_alone(stage, render):
+    """The lamp's image shines through the pane's upper edge on what is nearer than 0.5 m. The floor is farther."""
+    stage.floor(material=stage.diffuse(0.6))
+    pane(stage)
+    stage.light("AREA", (0, -0.5, 3), energy=100, size=1.0)
+    stage.world((0, 0, 0))
+    stage.scene.candela.slot_caustics = "OFF"
+    camera = stage.camera((0, -1.6, 5), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 1.2
+    light = render(1, 8, size=(16, 16))
+    assert light["diffuse_indirect"].mean() < 0.002 * light["diffuse_direct"].mean()
+
+
+def test_a_pane_beside_a_plate_takes_none_of_an_even_worlds_light(stage, render):
+    """What it mirrors is as bright as what it hides."""
+    stage.rectangle((-0.1, -0.5), (0.1, -0.3), z=0.2, material=stage.diffuse(0.5))
+    pane(stage)
+    stage.world((1, 1, 1))
+    stage.scene.candela.slot_caustics = "OFF"
+    camera = stage.camera((0, -0.4, 5), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.18
+    light = render(2, 32, size=(16, 16))
+    assert (light["diffuse_direct"] + light["diffuse_indirect"]).mean() == pytest.approx(0.5, rel=0.006)
