@@ -48,6 +48,7 @@ void main()
     bool glossy = false;
     bool gloss_takes = false;
     bool soft_takes = false;
+    bool onward = false;
     vec3 start = s.position;
     if (k == 0) {
       vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
@@ -82,6 +83,7 @@ void main()
         if (soft.fibre) {
           direction = fibre_sample(soft, vec4(to_unit(roll.x), to_unit(roll.y), u), weight);
           start = fibre_start(soft, s.position, direction, side);
+          onward = true;
         }
         else if (dot(direction, side) > 0.0) {
           weight = soft_reflection(soft, direction) * PI / max(turn * dot(direction, soft.normal), 1e-6);
@@ -90,7 +92,7 @@ void main()
 #endif
     }
     if (max_component(weight) > 0.0) {
-      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, gloss_takes, soft_takes, roll);
+      vec3 light = weight * near_radiance(ray_origin(start, side), direction, k > 0, onward, gloss_takes, soft_takes, roll);
       if (glossy) {
         out_glossy.rgb += light;
       }

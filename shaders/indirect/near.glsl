@@ -152,8 +152,9 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
 
 // Radiance that arrives at a surface that the picture shows, along a ray from surfaces nearer than the bound (from all
 // surfaces, if `whole`). Behind a `whole` ray, of a lobe, the bound is `glossy_radius`: paths between surfaces that shine
-// bring much by few, and no filter spreads that. `gloss`, `soft`: as of a walk.
-vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool gloss, bool soft, uvec3 roll)
+// bring much by few, and no filter spreads that. From strand to strand (`onward`) it is `near_radius`: virtual lights send
+// what they find to all sides, strands ahead. `gloss`, `soft`: as of a walk.
+vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool onward, bool gloss, bool soft, uvec3 roll)
 {
   Walk walk;
   walk.origin = origin;
@@ -164,5 +165,5 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, bool gloss, bool sof
   walk.soft = soft;
   walk.in_glass = false;
   walk.has_met = false;
-  return radiance_along(walk, whole ? glossy_radius : near_radius, roll);
+  return radiance_along(walk, (whole && !onward) ? glossy_radius : near_radius, roll);
 }

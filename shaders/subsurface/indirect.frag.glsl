@@ -21,7 +21,7 @@ void main()
     vec2 u = fract(shift + vec2(float(k) / float(rays), float(reverse_bits(uint(k)) >> 8u) / 16777216.0));
     vec3 direction = cosine_direction(normal, u);
     if (dot(direction, face) > 0.0) {
-      out_indirect.rgb += near_radiance(origin, direction, true, false, false, roll) / float(rays);
+      out_indirect.rgb += near_radiance(origin, direction, true, false, false, false, roll) / float(rays);
     }
   }
   out_indirect.rgb *= point_entry_fetch(texel).rgb;
