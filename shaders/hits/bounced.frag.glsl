@@ -24,7 +24,7 @@ vec3 light_of_turn(Receiver r, uvec3 roll)
     lit = passes ? -lit : lit;
     side = passes ? -side : side;
   }
-  if (r.mirrored >= bounces || max_component(reflection.diffuse + reflection.grazing) <= 0.0) {
+  if (max_component(reflection.diffuse + reflection.grazing) <= 0.0) {
     return sum;
   }
   vec3 from;

@@ -8,6 +8,11 @@ void main()
   if (!receiver_at(pixel, r)) {
     return;
   }
+#ifdef BOUNCED
+  if (r.mirrored >= bounces) {
+    return;
+  }
+#endif
   uvec3 roll = receiver_roll(pixel);
   vec3 straight;
   vec3 onward;

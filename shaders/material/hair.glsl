@@ -5,6 +5,9 @@
 // What has neither is diffuse and lets half of its light through (shader_hair).
 #include "material/shader.glsl"
 #include "lib/hair.glsl"
+#ifdef WIDENS_STRANDS
+#include "surface/round_strand.glsl"
+#endif
 
 // Half the width that is seen of a tube of so many sides, in radii, on the side of its axis where `beside` is: out to the
 // corner that is nearest to `across`. `facet`: normal of one of its sides.
@@ -40,7 +43,7 @@ void shader_fibre(inout Closures closures, SurfacePoint point, vec3 weight, vec4
   float size = length(tangent);
   tangent /= max(size, 1e-20);
 #ifdef WIDENS_STRANDS
-  bool is_round = normal_heights.z < 0.0;  // its normal is that of a round strand already (surface/point.glsl)
+  bool is_round = strand_is_round();  // its normal is that of a round strand already (surface/point.glsl)
 #else
   bool is_round = false;
 #endif

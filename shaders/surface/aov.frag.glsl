@@ -31,7 +31,7 @@ void main()
   }
 #ifdef WIDENS_STRANDS
   // Strands that are drawn wider than they are give something where the surface images have kept them.
-  if (strand_is_round() && (!strand_is_met() || !fragment_hidden(point.position, -1.0))) {
+  if (strand_missed || (strand_is_round() && !fragment_hidden(point.position, -1.0))) {
     discard;
   }
   gl_FragDepth = projected_depth(point.position, PROJECTION);

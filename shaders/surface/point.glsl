@@ -20,6 +20,11 @@ vec2 window_steps(vec3 step, vec3 plane_normal)
   return steps_along(step, plane_normal, dFdx(world_position), dFdy(world_position));
 }
 
+#ifdef WIDENS_STRANDS
+#include "lib/random.glsl"
+#include "surface/round_strand.glsl"
+#endif
+
 // How high above its triangle (x) and how far below it (y) a smooth-shaded surface is meant to run, on the viewer's side.
 // With barycentric coordinates b, corners V and normals N the parabola  sum over edges of b_i b_j (V_j - V_i) . (N_j - N_i),
 // which is what V . N, interpolated, is more than the point's own; and where normals lean together, up to the plane through
@@ -28,7 +33,7 @@ vec2 smooth_lift(Instance instance, bool back)
 {
   float reach = length(world_normal);
 #ifdef WIDENS_STRANDS
-  if (normal_heights.z < 0.0) {
+  if (strand_is_round()) {
     return vec2(0.0);  // strands are round as they are met
   }
 #endif
@@ -43,32 +48,9 @@ vec2 smooth_lift(Instance instance, bool back)
 }
 
 #ifdef WIDENS_STRANDS
-#include "lib/random.glsl"
 #define STRAND_CLEAR 1.02  // radii of the tube's corners, of which each is known to 3 % where strands bend
 
-// Whether a fragment is one of a strand that is round and drawn wider than it is (surface/strand.glsl).
-bool strand_is_round()
-{
-  return normal_heights.z < 0.0;
-}
-
-// Where the pixel's ray runs beside the fragment's, in half pixels: the same for all strands.
-vec2 strand_looks()
-{
-  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) ^ 0x68bc21ebu));
-  return 2.0 * vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz)) - 1.0;
-}
-
-// How far beside its axis that ray meets the strand, in radii.
-float strand_beside()
-{
-  return (strand_across.z + dot(strand_aside.xy, strand_looks())) / -normal_heights.z;
-}
-
-bool strand_is_met()
-{
-  return abs(strand_beside()) < 1.0;
-}
+bool strand_missed;  // by the pixel's ray, as surface_point finds
 
 // Where a strand is met. What is seen of it is round, and goes around the tube's corners, so that rays from it do not meet the
 // tube's own facets; of the far side, that open ends show, the tube will do.
@@ -76,7 +58,13 @@ void strand_meets(inout SurfacePoint point)
 {
   vec3 along = safe_normalize(strand_along);
   float narrowing = dot(along, point.geometric_normal);  // of what faces the viewer: by so much along the strand
-  float further = dot(strand_aside.zw, strand_looks());
+  // Where the pixel's ray runs beside the fragment's, in half pixels: the same for all strands.
+  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) ^ 0x68bc21ebu));
+  vec2 looks = 2.0 * vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz)) - 1.0;
+  // How far beside its axis that ray meets the strand, in radii.
+  float beside = (strand_across.z + dot(strand_aside.xy, looks)) / -normal_heights.z;
+  strand_missed = abs(beside) >= 1.0;
+  float further = dot(strand_aside.zw, looks);
   if (point.backfacing) {
     point.position += (along - narrowing * point.geometric_normal) * further;
     return;
@@ -85,7 +73,7 @@ void strand_meets(inout SurfacePoint point)
   float sine = length(side);
   side /= max(sine, 1e-20);
   vec3 before = cross(side, along);
-  float beside = clamp(strand_beside(), -1.0, 1.0);
+  beside = clamp(beside, -1.0, 1.0);
   float height = sqrt(1.0 - beside * beside);
   vec3 out_there = side * beside + before * height;
   float radius = STRAND_CLEAR * strand_across.w;
@@ -140,6 +128,7 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
   point.position_dy *= width;
   fill_attributes(point, window_steps(point.position_dx, flat_normal), window_steps(point.position_dy, flat_normal));
 #ifdef WIDENS_STRANDS
+  strand_missed = false;
   if (strand_is_round()) {
     strand_meets(point);
   }

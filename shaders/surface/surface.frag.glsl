@@ -42,7 +42,7 @@ void main()
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
 #ifdef WIDENS_STRANDS
-  if (strand_is_round() && !strand_is_met()) {
+  if (strand_missed) {
     discard;
   }
   gl_FragDepth = projected_depth(point.position, PROJECTION);

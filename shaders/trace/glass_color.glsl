@@ -13,7 +13,8 @@ vec3 glass_color(ivec2 hit, vec3 position, vec3 mean, float ior, float share, bo
   if (told.x == STAINED && told.y != 0.0) {
     float code = abs(leaf_texel(base + OPACITY_TEXEL)[k]);
     float sides = mod(code, SIDES * SIDES);
-    float opacity = mod(sides, SIDES) / (SIDES - 1.0);  // of light from all sides
+    float opacity = mod(sides, SIDES);  // of light from all sides; of a sheet, of what meets one of its sides
+    opacity = (triangle_is_sheet(hit) ? min(opacity, floor(sides / SIDES)) : opacity) / (SIDES - 1.0);  // from outside
 #ifdef OPACITY_TILES
     if (code >= MAPPED * SIDES * SIDES) {
       opacity = 0.5 * (tile_opacity(hit, sides, true, false, position) + tile_opacity(hit, sides, false, false, position));

@@ -45,6 +45,7 @@ def test_a_driver_that_holds_programs_in_much_memory_keeps_fewer(few_programs, m
         context.begin_picture()
         library.get(program(number))
     assert library.kept() <= kept and (lavapipe or library.kept() == kept)
+    assert all(library.has(program(number)) for number in range(20 - context.RECENT, 20)), "of recent pictures"
 
 
 def test_a_picture_of_many_programs_keeps_them_all(few_programs):

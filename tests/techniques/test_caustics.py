@@ -168,6 +168,38 @@ def test_mirror_ring_has_the_nephroid(stage, technique):
     assert np.interp(radius - 0.46, places_x, axis) < 0.1
 
 
+def checkered(stage, ior):
+    """Glass that is green where x < 0 and red beside."""
+    made = stage.material("ShaderNodeBsdfGlass", Roughness=0.0, IOR=ior)
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    checker, place = nodes.new("ShaderNodeTexChecker"), nodes.new("ShaderNodeTexCoord")
+    checker.inputs["Scale"].default_value = 0.5
+    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0.5, 0.5, 1), (0.5, 1, 0.5, 1)
+    shift = nodes.new("ShaderNodeMapping")
+    shift.inputs["Location"].default_value = (2.0, 1.0, 1.0)  # a step at x = 0 alone
+    links.new(place.outputs["Object"], shift.inputs["Vector"])
+    links.new(shift.outputs["Vector"], checker.inputs["Vector"])
+    links.new(checker.outputs["Color"], nodes["Glass BSDF"].inputs["Color"])
+    return made
+
+
+@pytest.mark.parametrize("columns", [(-4, 4), (-4, 0, 4)], ids=["patterns", "even faces"])
+def test_stained_water_passes_what_clear_water_does_times_its_colour(stage, columns):
+    """A sheet, green and red, under a sun at its normal: colour (1 - F) / n^2. Faces of one colour had (1 - F) / n^4."""
+    stage.floor()
+    corners = np.array([(x, y, 0.5) for y in (-4, 4) for x in columns])
+    count = len(columns)
+    faces = [(k, k + 1, k + 1 + count, k + count) for k in range(count - 1)]
+    stage.mesh(corners, faces, material=checkered(stage, 1.33)).visible_camera = False
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(1.0)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    found = stage.render(samples=4, size=(24, 24), bounces=3)["diffuse_indirect"][..., :3]
+    clear = (1 - (0.33 / 2.33) ** 2) / 1.33**2
+    assert found[8:16, 4:9].mean((0, 1)) == pytest.approx(clear * np.array([0.5, 1.0, 0.5]), abs=0.03)
+    assert found[8:16, 15:20].mean((0, 1)) == pytest.approx(clear * np.array([1.0, 0.5, 0.5]), abs=0.03)
+
+
 @pytest.mark.slow
 def test_flat_water_passes_the_share_that_fresnel_leaves(stage):
     """A sheet of index 1.33 under a sun at 30 degrees from its normal: E cos T / n^2 on the floor below, evenly. The
@@ -800,16 +832,7 @@ def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
 
 def test_a_pattern_colours_light_where_it_enters_glass_and_where_it_leaves(stage):
     """A slab of index 1 between a sun and a floor, green where x < 0 and red beside: light crosses two faces of one."""
-    made = stage.material("ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.0)
-    nodes, links = made.node_tree.nodes, made.node_tree.links
-    checker, place = nodes.new("ShaderNodeTexChecker"), nodes.new("ShaderNodeTexCoord")
-    checker.inputs["Scale"].default_value = 0.5
-    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0.5, 0.5, 1), (0.5, 1, 0.5, 1)
-    shift = nodes.new("ShaderNodeMapping")
-    shift.inputs["Location"].default_value = (2.0, 1.0, 1.0)  # a step at x = 0 alone
-    links.new(place.outputs["Object"], shift.inputs["Vector"])
-    links.new(shift.outputs["Vector"], checker.inputs["Vector"])
-    links.new(checker.outputs["Color"], nodes["Glass BSDF"].inputs["Color"])
+    made = checkered(stage, 1.0)
     bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, radius=0.1, location=(5, 5, 1))  # no pane alone
     bpy.context.object.data.materials.append(made)
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0, 0, 0.5))
