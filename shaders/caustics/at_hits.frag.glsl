@@ -5,6 +5,7 @@
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "hits/shown.glsl"
+#include "caustics/least_cosine.glsl"
 #include "ask/leaving.glsl"
 #ifdef SOFT
 #include "lib/soft_lobe.glsl"
@@ -110,7 +111,7 @@ void main()
 #ifdef SOFT
     if (has_lobe && max_component(arriving) > 0.0) {
       vec3 to_light = safe_normalize(way_to_light(place.xyz));
-      by_lobe += arriving * soft_reflection(soft, to_light) / max(dot(normal, to_light), 1e-2);
+      by_lobe += arriving * soft_reflection(soft, to_light) / max(dot(normal, to_light), LEAST_COSINE);
     }
 #endif
   }

@@ -5,14 +5,13 @@
 #include "lib/brdf.glsl"
 #include "caustics/receiver.glsl"
 #include "caustics/arrival.glsl"
+#include "caustics/least_cosine.glsl"
 #ifdef GLOSS
 #include "caustics/gloss.glsl"
 #endif
 #ifdef SOFT
 #include "lib/soft_lobe.glsl"
 #endif
-
-#define LEAST_COSINE 1e-2  // of arriving light, over which a footprint's irradiance is known
 
 #ifdef GLOSS
 // What the lobe reflects of light from `direction`, per irradiance.

@@ -6,7 +6,7 @@
 vec3 mirror_scale(int material)
 {
   ivec2 place = ivec2(material & 15, material >> 4);
-  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  int rows = reflectance_rows();
   vec3 mirrored = max(reflectance_fetch(place).rgb - reflectance_fetch(place + ivec2(0, rows)).rgb, vec3(0.0));
   vec3 straight = reflectance_fetch(place + ivec2(0, 2 * rows)).rgb;
   vec3 grazing = reflectance_fetch(place + ivec2(0, 3 * rows)).rgb;
@@ -18,7 +18,7 @@ vec3 mirror_scale(int material)
 vec3 mirror_color(int material, float cosine)
 {
   ivec2 place = ivec2(material & 15, material >> 4);
-  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  int rows = reflectance_rows();
   vec3 straight = reflectance_fetch(place + ivec2(0, 2 * rows)).rgb;
   vec3 grazing = reflectance_fetch(place + ivec2(0, 3 * rows)).rgb;
   return mirror_scale(material) * mix(straight, grazing, pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0));

@@ -92,7 +92,7 @@ Reflection mean_reflection(ivec2 hit)
 {
   int material = triangle_material(hit);
   ivec2 place = ivec2(material & 15, material >> 4);
-  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  int rows = reflectance_rows();
   vec4 straight = reflectance_fetch(place + ivec2(0, 2 * rows));
   Reflection mean;
   vec4 diffuse = reflectance_fetch(place + ivec2(0, rows));
@@ -111,7 +111,7 @@ Reflection mean_reflection(ivec2 hit)
 vec3 mean_turned(ivec2 hit, vec3 normal, out float upright)
 {
   int material = triangle_material(hit);
-  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  int rows = reflectance_rows();
   ivec2 place = ivec2(material & 15, (material >> 4) + 4 * rows);
   vec4 x = reflectance_fetch(place);
   vec4 y = reflectance_fetch(place + ivec2(0, rows));
@@ -160,7 +160,7 @@ bool may_be_mirror(ivec2 hit, vec3 position, vec3 direction)
 {
   int material = triangle_material(hit);
   ivec2 place = ivec2(material & 15, material >> 4);
-  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  int rows = reflectance_rows();
   float code = reflectance_fetch(place).a;
   bool metal = code > 0.5;
   for (bool unsure = metal; unsure; unsure = false) {
@@ -224,7 +224,7 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
 #endif
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
   for (; is_mirror; is_mirror = false) {
-    ivec2 place = ivec2(material & 15, (material >> 4) + reflectance_size().y / REFLECTANCE_BANDS);
+    ivec2 place = ivec2(material & 15, (material >> 4) + reflectance_rows());
     float alpha = reflectance_fetch(place).a / code;
     met.mirror_alpha = (alpha <= SMOOTH_MIRRORS) ? alpha : -1.0;
     met.mirror_share = mirror_scale(material);

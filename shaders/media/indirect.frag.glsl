@@ -38,7 +38,7 @@ vec3 mean_albedo(ivec2 hit, out vec3 through)
   int material = triangle_material(hit);
   ivec2 place = ivec2(material & 15, material >> 4);
   vec3 albedo = reflectance_fetch(place).rgb;
-  through = min(reflectance_fetch(place + ivec2(0, 8 * (reflectance_size().y / REFLECTANCE_BANDS))).rgb, albedo);
+  through = min(reflectance_fetch(place + ivec2(0, 8 * reflectance_rows())).rgb, albedo);
   return albedo;
 }
 
