@@ -33,9 +33,9 @@ LIGHT = Record(
         # Half height, or row; 1 / ((1 - cosine) blend), 0: a hard edge, or of a point on a surface
         # EmissiveTriangles.level, W / (m2 sr).
         ("vec3 v", "float edge"),
-        # Row; least squared distance at which the point stands for its part of the light, of points on surfaces over
-        # their area.
-        ("vec3 w", "float least"),
+        # Row; for light_least of shaders/light/sources.glsl: m2, of points on surfaces over their area, which pixels
+        # that draw points of their own replace.
+        ("vec3 w", "float footprint"),
     ),
     kinds=("POINT", "SPHERE", "SUN", "RECTANGLE", "ELLIPSE", "DIRECTION", "SURFACE"),
     flags=(
@@ -196,7 +196,7 @@ class Emitter:
         rows[0] = kind, flags, first_view, view_count
         rows[at.point], rows[at.rate] = sample, rate
         rows[at.radiance] = self.radiance * weight / rate
-        rows[at.least] = footprint(self.area, points) if self.kind != SUN else 0.0
+        rows[at.footprint] = footprint(self.area, points) if self.kind != SUN else 0.0
         return rows if self.maps is None else MappedRow.of(rows, self.maps)
 
 
@@ -389,7 +389,7 @@ def surface_row(
     return LIGHT.rows(
         kind=SURFACE, flags=flags if view_count else flags & ~SHADOW_FLAG, first_view=first_view,
         view_count=view_count, centre=point, point=point, rate=1.0, radiance=radiance, area=1.0 / density, axis=normal,
-        least=footprint(1.0, samples),
+        footprint=footprint(1.0, samples),
     )  # fmt: skip
 
 

@@ -167,7 +167,7 @@ class EmissiveLight(Technique):
             )
             close_by = bool(self._triangles.flags[0] & lights.DIFFUSE_FLAG)  # the same of all
             if close_by:
-                least = float(own[lights.LIGHT.at.least]) * self._triangles.power / count
+                least = float(own[lights.LIGHT.at.footprint]) * self._triangles.power / count
                 yield from self._close_by(frame, least, blocked)
             frame.account.count(self, "rays per pixel", count + close_by)
             if self._beside is None:
@@ -196,7 +196,7 @@ class EmissiveLight(Technique):
         if self._own is not None:
             spread = self._left_out * count / self._triangles.power
             for point in points:
-                point.row[lights.LIGHT.at.least] = spread
+                point.row[lights.LIGHT.at.footprint] = spread
         yield from light_surfaces(frame, self, points, 1 << lights.SURFACE, self._sources)
 
     def _choose_own(self, frame: Frame) -> None:

@@ -33,7 +33,7 @@ struct Walk {
   bool whole;   // it brings all light of what it meets, however far that is
   bool gloss;   // it begins at a glossy lobe that takes photons (caustics/gloss.glsl)
   bool soft;    // it begins at a lobe without microfacets that takes them as diffuse surfaces do
-  bool in_glass; // it begins at what is (Vertex)
+  bool in_glass; // it begins at a point in glass, whose light counts what the glass mirrors back (Vertex.in_glass)
   bool has_met; // it has met `met` already
   Vertex met;
 };
@@ -42,7 +42,8 @@ struct Walk {
 // nearer to that one than `reach` send to it, each with the share that virtual lights leave to it, and what reaches those in
 // the same way: that last light, of which there is little and which takes most of the time where small things stand close,
 // only some samples look for (`deeper`: the weight that it has in them, 0 in the others; below 0 where it is left out but
-// for what comes over mirrors, which virtual lights do not send).
+// for what comes over mirrors, which virtual lights do not send). What a sheet of glass mirrors from within has one ray
+// beyond `bounces`.
 vec3 radiance_along(Walk walk, float reach, uvec3 roll)
 {
   // Where a sample has no virtual lights, rays go as far as one light would leave to them.

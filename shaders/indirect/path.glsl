@@ -35,7 +35,7 @@ struct Vertex {
   vec3 passed;   // colours of layers before it
   vec3 leaving;  // radiance of direct light that entered elsewhere
   vec3 straight; // of the diffuse albedo, what direct light is reflected by here
-  bool in_glass; // both count what glass around mirrors back of what is sent
+  bool in_glass; // `leaving` and `reflection` count what glass around mirrors back of what is sent
 #ifdef HIT_LINKS
   int group;    // of receivers (addon/snapshot/linking.py)
 #endif
@@ -551,7 +551,7 @@ vec3 emission_close_by(Light light, vec3 origin, vec3 normal, bool glass_stops, 
   uvec3 bits = hash3(uvec3(salt, 61u, 7u));
   direction = cosine_direction(normal, vec2(to_unit(bits.x), to_unit(bits.y)));
   float level = light_edge(light);
-  float spread = light_least(light) * light.area * emissive_density(light.radiance, level);  // the same of all points
+  float spread = light_least(light) * emissive_density(light.radiance, level);  // the same of all points
   float reach = sqrt(spread / max(level, 1e-30));
   ivec2 hit;
   float t = trace_layers(origin, direction, reach, 0.0, bits.z, glass_stops, false, hit);

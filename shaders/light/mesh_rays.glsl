@@ -68,7 +68,7 @@ Light own_point(Light light, int number)
     float often = emissive_density(radiance, mesh_light_level);
     // What is drawn more often stands for less of the light, and may be nearer.
     float area = mesh_light_power / max(often * float(light_count), 1e-30);
-    float squared = max(dot(way, way), light_least(light) * area);
+    float squared = max(dot(way, way), light_footprint(light) * area);
     vec3 direction = safe_normalize(way);
     float cos_light = -dot(direction, facing);
     cos_light = (edge.w > 0.5) ? max(cos_light, 0.0) : abs(cos_light);

@@ -29,6 +29,12 @@ vec3 light_tree(Light light, vec3 direction, vec3 from, float path)
   return vec3(1.0);
 }
 
+// Least squared distance, m2, at which a light's point stands for its part of the light.
+float light_least(Light light)
+{
+  return light_footprint(light) * (LIGHT_IS(light, LIGHT_SURFACE) ? light.area : 1.0);
+}
+
 // Falloff of a spot for a ray that leaves it along `direction`.
 float spot_attenuation(Light light, vec3 direction)
 {
@@ -128,8 +134,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       return vec3(0.0);
     }
     density = squared / max(light.area * cos_light, 1e-30);  // lobes know it, however near the light is
-    float least = light_least(light) * (LIGHT_IS(light, LIGHT_SURFACE) ? light.area : 1.0);
-    float solid_angle = light.area * cos_light / max(squared, least);
+    float solid_angle = light.area * cos_light / max(squared, light_least(light));
     vec3 radiance = light.radiance * light_tree(light, -direction, light.point, path);
     return radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
   }

@@ -12,7 +12,10 @@
 // What the glass mirrors back of it comes from where it left: out_landed has the cells of four of the rays, drawn by what each
 // brings, out_again what of the light there enters here (echo.frag.glsl).
 //
-// Rays of indirect light that begin at such points bring none of what their glass mirrors (trace_vertex of indirect/path.glsl). w: 1 in glass, else 0, and the factor is 1.
+// Rays of indirect light that begin at such points bring none of what their glass mirrors (trace_vertex of
+// indirect/path.glsl).
+//
+// out_coat  rgb: the factor; w: 1 in glass, else 0, and the factor is 1
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "subsurface/walks.glsl"

@@ -110,12 +110,14 @@ void main()
   }
   rest *= walk_rest(color.rgb);
   vec3 norm = (vec3(1.0) + rest / max(left_so_far, vec3(1e-6))) / max(color.rgb, vec3(1e-3));
+  float scale = 1.0 + luminance(rest) / max(luminance(left_so_far), 1e-6);
   // In glass the rest is sent as by a diffuse surface, too.
   float rests = coat.w * (1.0 - part);
   part += rests;
   rests /= part;
   vec3 diffuse = float(walks) * min(shape.w, 1.0) * cell_direct_fetch(texel).rgb;
-  out_sent = vec4(mix(sent_so_far * norm, diffuse, rests), squares);
+  scale *= 1.0 - rests;
+  out_sent = vec4(mix(sent_so_far * norm, diffuse, rests), scale * scale * squares);
   // One over the variance of the cosine, and of either component along the surface.
   norm *= 1.0 - rests;
   out_slope = vec4(18.0 * by_cosine * norm, coat.w);

@@ -13,9 +13,9 @@ vec4 leaving_texel(int index)
 }
 
 // Light at `position` of a surface that faces along `normal`; material -1: of any. For albedo 1: `sent`, the radiance that leaves
-// towards the viewer of direct light; `part`, the share of the diffuse albedo that this takes the place of; `same`, by how much of its albedo that part
-// sends back light that arrives evenly on this side; `in_glass`: both
-// count all that glass around mirrors back (coat.frag.glsl), so that rays bring none of it. False where nothing scatters.
+// towards the viewer of direct light; `part`, the share of the diffuse albedo that this takes the place of; `same`, by how much of
+// its albedo that part sends back light that arrives evenly on this side; `in_glass`: `sent` and `same` count all that glass
+// around mirrors back (coat.frag.glsl), so that rays bring none of it. False where nothing scatters.
 bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint salt, out vec3 sent, out vec3 part,
                   out vec3 same, out bool in_glass)
 {

@@ -185,7 +185,7 @@ def checkered(stage, ior):
 
 @pytest.mark.parametrize("columns", [(-4, 4), (-4, 0, 4)], ids=["patterns", "even faces"])
 def test_stained_water_passes_what_clear_water_does_times_its_colour(stage, columns):
-    """A sheet, green and red, under a sun at its normal: colour (1 - F) / n^2, whether or not faces are of one colour."""
+    """A sheet, green and red, under a sun at its normal: colour (1 - F) / n^2, faces of one colour or not."""
     stage.floor()
     corners = np.array([(x, y, 0.5) for y in (-4, 4) for x in columns])
     count = len(columns)
