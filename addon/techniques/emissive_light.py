@@ -27,7 +27,9 @@ tube before its board, a short ray of each pixel finds (light/close_by.frag.glsl
 
 Emission that varies is measured place by place (scene/emission_maps.py).
 
-Fails: very many small emitters need many samples.
+Fails: very many small emitters need many samples. Short rays bring light to diffuse closures alone: of a tube before
+its board velvet, sheen, toon, hair and translucent surfaces that the camera sees lack what points leave out; in mirrors
+and along paths they have it.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@
 #include "lib/random.glsl"
 #include "subsurface/walks.glsl"
 #include "subsurface/again.glsl"
+#include "subsurface/objects.glsl"
 
 #define WAYS 64
 #define FACES 12  // that a ray is mirrored by
@@ -33,11 +34,6 @@ float glass_index(ivec2 hit)
   }
   int material = triangle_material(hit);
   return glass_indices_fetch(ivec2(material & 2047, material >> 11)).x;
-}
-
-vec4 object_texel(int index)
-{
-  return scatter_objects_fetch(ivec2(index & 2047, index >> 11));
 }
 
 // The cell of the instance where a ray has met it; -1 of other instances.

@@ -7,11 +7,7 @@
 #include "lib/closure.glsl"
 #include "subsurface/image.glsl"
 #include "subsurface/dipole.glsl"
-
-vec4 object_texel(int index)
-{
-  return scatter_objects_fetch(ivec2(index & 2047, index >> 11));
-}
+#include "subsurface/objects.glsl"
 
 // Number of the box of objects that lamps see this one in; below 0: none, all its light is that of points.
 float box_of(int object)

@@ -8,6 +8,7 @@
 #include "lib/gbuffer.glsl"
 #include "subsurface/image.glsl"
 #include "subsurface/lean.glsl"
+#include "subsurface/objects.glsl"
 
 #define ALIKE 0.6       // cosine between normals of points from which on directions are alike
 #define AS_DIFFUSE 8.0  // walks that count as of a diffuse surface: few tell little of directions, as do many of which few find light
@@ -17,11 +18,6 @@
 #define FARTHEST 2.5    // standard deviations
 #define COLORS 2.5      // times as wide are means of colours, up to
 #define COLORS_FARTHEST 1.5  // of their standard deviations
-
-vec4 object_texel(int index)
-{
-  return scatter_objects_fetch(ivec2(index & 2047, index >> 11));
-}
 
 float alike_facing(vec3 facing, vec3 normal)
 {

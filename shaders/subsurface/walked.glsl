@@ -1,16 +1,12 @@
 // Which part of a pixel's light below its surface random walks find, and where places lie in the picture. A program that includes
 // this binds `film_view`, `scatter_objects` and `surface_position`.
 #include "ask/view.glsl"
+#include "subsurface/objects.glsl"
 
 #define DEEP 4.0
 #define DEEPER 12.0
 #define FINE 0.5
 #define COARSEST 0.1
-
-vec4 object_texel(int index)
-{
-  return scatter_objects_fetch(ivec2(index & 2047, index >> 11));
-}
 
 float pixel_width_at(vec3 position)
 {
