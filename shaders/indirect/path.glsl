@@ -234,7 +234,7 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
 #ifdef GLASS_MIRRORS
     // Glass stops rays with the chance that Fresnel's reflectance has in the mean over even light, and mirrors those by
     // that at their angle over the mean. Beside other closures no mirror is known apart.
-    float ior = reflectance_fetch(place + ivec2(0, 6 * (reflectance_size().y / REFLECTANCE_BANDS))).a;
+    float ior = reflectance_fetch(place + ivec2(0, 6 * reflectance_rows())).a;
     for (bool glass = triangle_is_glass(hit); glass; glass = false) {
       if (ior <= 0.0 || max_component(met.reflection.diffuse) > 0.0) {
         met.mirror_alpha = -1.0;

@@ -1,5 +1,5 @@
-// Light straight from sources as it enters at points in glass, in place of what arrives along straight rays (coat.frag.glsl). `cell_across`:
-// irradiance whatever its cosine, of light from above the point's horizon alone.
+// Light straight from sources as it enters at points in glass, in place of what arrives along straight rays (coat.frag.glsl).
+// `cell_across`: irradiance whatever its cosine, of light from above the point's horizon alone.
 #include "lib/math.glsl"
 
 void main()
