@@ -7,8 +7,7 @@ samples so many that the picture has FEWEST_POINTS), each with depth maps. All a
     p(y) = (lum(Le) + mean of lum) / (2 power)
 
 As in Cycles, emission leaves both sides of a surface; of a closed convex mesh that nobody looks into the outside
-counts. Narrow lobes find emissive triangles by their own rays
-(traced_glossy), weighted against these points.
+counts. Narrow lobes find emissive triangles by their own rays (traced_glossy), weighted against these points.
 
 | cost | per sample |
 |---|---|
@@ -27,9 +26,8 @@ tube before its board, a short ray of each pixel finds (light/close_by.frag.glsl
 
 Emission that varies is measured place by place (scene/emission_maps.py).
 
-Fails: very many small emitters need many samples. Short rays bring light to diffuse closures alone: of a tube before
-its board velvet, sheen, toon, hair and translucent surfaces that the camera sees lack what points leave out; in mirrors
-and along paths they have it.
+Fails: very many small emitters need many samples. What short rays find lights diffuse closures alone; others have it
+in mirrors and along paths.
 """
 
 from __future__ import annotations

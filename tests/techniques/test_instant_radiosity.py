@@ -366,13 +366,14 @@ def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_
     means.release()
 
 
-def test_mean_of_a_mirror_among_other_lobes_keeps_the_width_of_the_mirror(stage, gpu_context):
-    """Seven tenths of the pixels keep the smooth one of two lobes of metal, of alpha .2^2."""
-    material = stage.material("ShaderNodeMixShader", Fac=0.3)
+def mirrored_by_metal(stage, rougher, roughness):
+    """(share that is a mirror, sum of its alpha) of the mean of a floor of metal, of which the share `rougher` has the
+    second of two values of roughness."""
+    material = stage.material("ShaderNodeMixShader", Fac=rougher)
     tree = material.node_tree
-    for place, roughness in ((1, 0.2), (2, 0.9)):
+    for place, one in enumerate(roughness, 1):
         lobe = tree.nodes.new("ShaderNodeBsdfAnisotropic")
-        lobe.inputs["Roughness"].default_value = roughness
+        lobe.inputs["Roughness"].default_value = one
         tree.links.new(lobe.outputs[0], tree.nodes["Mix Shader"].inputs[place])
     stage.floor(material=material)
     stage.camera_above(4.0)
@@ -380,28 +381,20 @@ def test_mean_of_a_mirror_among_other_lobes_keeps_the_width_of_the_mirror(stage,
     means = Reflectance()
     means.update(stage.renderer.frame)
     found = images.read(means.image)
-    share, alpha = found[0, 1, 3], found[1, 1, 3]
+    means.release()
+    return found[0, 1, 3], found[1, 1, 3]
+
+
+def test_mean_of_a_mirror_among_other_lobes_keeps_the_width_of_the_mirror(stage, gpu_context):
+    """Seven tenths of the pixels keep the smooth one of two lobes of metal, of alpha .2^2."""
+    share, alpha = mirrored_by_metal(stage, 0.3, (0.2, 0.9))
     assert 0.55 < share < 0.85
     assert alpha / share == pytest.approx(0.04, rel=0.01)
-    means.release()
 
 
 def test_some_places_of_metal_that_are_rougher_do_not_end_its_mirror(stage, gpu_context):
     """Of two lobes of metal of roughness .1 and .4 a tenth of the pixels keep the rougher one: mean alpha .025."""
-    material = stage.material("ShaderNodeMixShader", Fac=0.1)
-    tree = material.node_tree
-    for place, roughness in ((1, 0.1), (2, 0.4)):
-        lobe = tree.nodes.new("ShaderNodeBsdfAnisotropic")
-        lobe.inputs["Roughness"].default_value = roughness
-        tree.links.new(lobe.outputs[0], tree.nodes["Mix Shader"].inputs[place])
-    stage.floor(material=material)
-    stage.camera_above(4.0)
-    stage.render(1)
-    means = Reflectance()
-    means.update(stage.renderer.frame)
-    found = images.read(means.image)
-    share, alpha = found[0, 1, 3], found[1, 1, 3]
-    means.release()
+    share, alpha = mirrored_by_metal(stage, 0.1, (0.1, 0.4))
     print(f"{share:.3f} {alpha:.4f}")
     assert share == pytest.approx(1.0, abs=0.01)
     assert 0.01 < alpha < 0.04 and alpha <= float(dict(MIRRORS)["SMOOTH_MIRRORS"]) * share

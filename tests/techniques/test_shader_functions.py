@@ -19,6 +19,16 @@ from addon.surfaces.scatter_means import MEANS
 from addon.techniques.multires_radiosity import PULL
 from tests.glsl import evaluated
 
+# Of 64 x 64 directions that `reflection_sample` draws: the mean weight, the largest, and that by the cosine alone.
+SAMPLED = """
+  float sum = 0.0; float most = 0.0; float blunt = 0.0;
+  for (int i = 0; i < 64 * 64; i++) {
+    vec2 u = (vec2(i % 64, i / 64) + 0.5) / 64.0; vec3 weight;
+    reflection_sample(r, normal, viewer, u, weight);
+    sum += weight.x / (64.0 * 64.0); most = max(most, weight.x);
+    blunt = max(blunt, PI * reflection_of(r, normal, cosine_direction(normal, u), viewer).x);
+  }"""
+
 
 def with_table() -> dict:
     """Of programs that read the energy of microfacets."""
@@ -330,17 +340,14 @@ def test_of_a_caustic_map_is_kept_what_lies_on_surfaces(gpu_context):
 def test_paths_leave_by_the_lobe_with_its_energy_and_never_far_too_bright(gpu_context):
     """What a point draws of light from all sides is, in the mean, its integral over directions, at every slant; and no
     direction weighs much more than the mean, of which the cosine's own density made hundreds at grazing views."""
-    before = """Reflection r; r.diffuse = vec3(0.1); r.through = vec3(0.0); r.rough = 0.0;
+    before = (
+        """Reflection r; r.diffuse = vec3(0.1); r.through = vec3(0.0); r.rough = 0.0;
   r.straight = vec3(0.6);
   r.grazing = vec3(0.9); r.alpha = 0.25; float slant = 0.02 + 0.98 * k; vec3 normal = vec3(0.0, 0.6, 0.8);
   vec3 viewer = slant * normal + sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0);
-  float sum = 0.0; float most = 0.0; float blunt = 0.0;
-  for (int i = 0; i < 64 * 64; i++) {
-    vec2 u = (vec2(i % 64, i / 64) + 0.5) / 64.0; vec3 weight;
-    reflection_sample(r, normal, viewer, u, weight);
-    sum += weight.x / (64.0 * 64.0); most = max(most, weight.x);
-    blunt = max(blunt, PI * reflection_of(r, normal, cosine_direction(normal, u), viewer).x);
-  }"""
+"""
+        + SAMPLED
+    )
     found = evaluated(
         "lib/gbuffer.glsl lib/brdf.glsl indirect/albedo.glsl",
         "vec4(sum, most, blunt, 0.0)",
@@ -372,17 +379,14 @@ def test_paths_through_strands_leave_ahead_and_never_far_too_bright(gpu_context)
     """Behind a strand that light shines through: the mean of what is drawn is the integral over directions, at every
     slant of the view, and no weight is twice as large as all that arrives, where the cosine's own density makes 4.5."""
     n = 9.0
-    before = f"""Reflection r; r.diffuse = vec3(1.0); r.through = vec3(1.0); r.rough = -0.01;
+    before = (
+        f"""Reflection r; r.diffuse = vec3(1.0); r.through = vec3(1.0); r.rough = -0.01;
   r.straight = vec3(0.0); r.grazing = vec3(0.0); r.alpha = {n};
   float slant = 0.02 + 0.98 * k; vec3 normal = vec3(0.0, 0.6, 0.8);
   vec3 viewer = sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0) - slant * normal;
-  float sum = 0.0; float most = 0.0; float blunt = 0.0;
-  for (int i = 0; i < 64 * 64; i++) {{
-    vec2 u = (vec2(i % 64, i / 64) + 0.5) / 64.0; vec3 weight;
-    reflection_sample(r, normal, viewer, u, weight);
-    sum += weight.x / (64.0 * 64.0); most = max(most, weight.x);
-    blunt = max(blunt, PI * reflection_of(r, normal, cosine_direction(normal, u), viewer).x);
-  }}"""
+"""
+        + SAMPLED
+    )
     found = evaluated(
         "lib/gbuffer.glsl lib/brdf.glsl indirect/albedo.glsl",
         "vec4(sum, most, blunt, 0.0)",
