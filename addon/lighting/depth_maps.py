@@ -350,7 +350,7 @@ def draw_views(
             for call in layered:
                 passes.set_culling("BACK" if call.draw.material in from_outside else "NONE")
                 shader, bindings = alpha.programs[call.draw.material]
-                own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point,
+                own = {"first_instance": call.first, "caster_sample": sample, "light_point": view.light_point,
                        "glass_blocks": int(view.glass_blocks), "channel_asked": view.channel}  # fmt: skip
                 shader.bind(**bindings, constants={**constants, **own})
                 passes.draw(shader, call.draw.batch, call.count)
@@ -360,7 +360,7 @@ def draw_views(
         with passes.drawing(atlas.target, viewport=viewport) if np.any(seen) else nullcontext():
             for draw, shader, bindings, extra in (alpha.layers[k] for k in np.flatnonzero(seen)):
                 passes.write_alpha_alone()
-                own = {"first_instance": draw.first, "sample_index": sample, "light_point": view.light_point,
+                own = {"first_instance": draw.first, "caster_sample": sample, "light_point": view.light_point,
                        "glass_blocks": 0, "channel_asked": 0}  # fmt: skip
                 shader.bind(**bindings, constants={**constants, **own, **extra})
                 passes.draw(shader, draw.batch, draw.count)

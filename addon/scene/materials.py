@@ -607,7 +607,7 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
         constants=(
             *PROJECTION_CONSTANTS,
-            ("INT", "sample_index"),
+            ("INT", "caster_sample"),
             ("VEC4", "light_point"),
             ("INT", "glass_blocks"),
             ("INT", "channel_asked"),

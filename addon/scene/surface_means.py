@@ -81,7 +81,7 @@ def _sum(geometry: SceneGeometry, numbers: list[int], program: Program, bindings
         for number, backward in enumerate(VIEWS):
             view = overview(low, high, backward)
             constants = {name: view[name] for name in ("row_x", "row_y", "row_w", "row_q")}
-            constants |= {"near": 0.5, "first_instance": 0, "light_point": (*backward, 0.0), "sample_index": side}
+            constants |= {"near": 0.5, "first_instance": 0, "light_point": (*backward, 0.0), "caster_sample": side}
             state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
             with passes.drawing(target, viewport=(0, number * SIDE, SIDE, SIDE), **state):
                 shader.bind(**bindings, constants=constants)

@@ -100,7 +100,7 @@ CLOSE_BY = passes.fullscreen_program(
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
     constants=(
         *RAY_CONSTANTS,
-        ("FLOAT", "reach"),
+        ("FLOAT", "close_reach"),
         ("FLOAT", "drawn_least"),
         ("FLOAT", "mesh_light_level"),
         ("INT", "glass_blocks"),
@@ -237,7 +237,8 @@ class EmissiveLight(Technique):
         proportion to. Rays are those of diffuse paths: they meet the meshes that light diffuse surfaces, whether or not
         those cast shadows. `glass_blocks`: photons bring what passes glass."""
         constants = {
-            "reach": self._triangles.reach_of(least), "drawn_least": least, "mesh_light_level": self._triangles.level,
+            "close_reach": self._triangles.reach_of(least), "drawn_least": least,
+            "mesh_light_level": self._triangles.level,
             "glass_blocks": int(glass_blocks), "offset_size": frame.offset_size,
         }  # fmt: skip
         textures = {"energy_table": frame.materials.energy_table, **frame.hierarchy("diffuse").textures}

@@ -81,7 +81,7 @@ def grass_caster(caster: Program, uv: int = -1) -> Program:
         ("OWN_CLOSURES", ""),
         ("CASTS_WHOLE", ""),
         ("LAYER", ""),
-        ("GRASS_SAMPLE", "sample_index"),
+        ("GRASS_SAMPLE", "caster_sample"),
         ("GRASS_SEED", "0"),
         *_placed(uv),
     )

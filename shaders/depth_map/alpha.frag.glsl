@@ -60,7 +60,7 @@ void main()
 #ifndef CASTS_WHOLE
   point.refracts = glass_blocks != 0;  // what it lets through is a lobe then, and no transparency
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u));
-  bits = hash3(uvec3(bits.x, uint(gl_PrimitiveID), uint(sample_index)));
+  bits = hash3(uvec3(bits.x, uint(gl_PrimitiveID), uint(caster_sample)));
   Closures c = closures_begin(point.normal, to_unit(bits.y), 0.0);
   evaluate_material(point, c);
   closures_end(c);

@@ -26,8 +26,8 @@ void main()
   }
   vec3 origin = ray_origin(s.position, s.geometric_normal);
   ivec2 hit;
-  float t = trace_layers(origin, direction, reach, 0.0, salt.z + uint(film_view.sample_index), glass_blocks != 0, false, hit);
-  if (t >= reach) {
+  float t = trace_layers(origin, direction, close_reach, 0.0, salt.z + uint(film_view.sample_index), glass_blocks != 0, false, hit);
+  if (t >= close_reach) {
     return;
   }
   vec3 ignored;

@@ -1,5 +1,5 @@
-// How much enters in all where the share `again` of it enters once more, up to `bounces` times.
-vec3 echoes(vec3 again, int bounces)
+// How much enters in all where the share `again` of it enters once more, up to `times` times.
+vec3 echoes(vec3 again, int times)
 {
-  return (vec3(1.0) - pow(again, vec3(float(bounces + 1)))) / (vec3(1.0) - again);
+  return (vec3(1.0) - pow(again, vec3(float(times + 1)))) / (vec3(1.0) - again);
 }
