@@ -7,8 +7,8 @@ mirrors stays with indirect light.
 A light is answered for if it casts shadows and diffuse surfaces see it, however wide it is. So are emissive meshes,
 and, where there is glass, the bright part of the world (sources/bright_world.py): the rest of it is wide light, which
 clear glass leaves as it is. Shadow rays of what is answered for take glass as opaque: what passes it arrives as
-photons of it. All glass counts there, so a pane beside a lens is a caster, too. Where all glass is flat panes and no
-metal is smooth, panes are left to straight light, as is right for them, and metal is a caster alone.
+photons of it. All glass counts there, so a pane beside a lens is a caster, too. A scene in which all glass is flat
+panes and no metal is smooth is left to straight light, as is right for panes.
 
 Of lamps that light linking keeps from all casters nothing is bent or mirrored.
 
@@ -114,10 +114,7 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     smooth = any(rough <= gloss.SMOOTH for rough in mirrors.values())
     of_glass = {one.mesh for one in shown if not glass.isdisjoint(one.materials)}
     if film.caustics_refractive and of_glass and not smooth and all(_is_pane(snapshot.meshes[k]) for k in of_glass):
-        glass, mirrors = set(), {number: rough for number, rough in mirrors.items() if number not in glass}
-        shown = [one for one in shown if not set(mirrors).isdisjoint(one.materials)]
-        if not shown:
-            return "all glass is flat panes, which light passes straight"
+        return "all glass is flat panes, which light passes straight"
     lamps = (light for light in snapshot.lights if light.cast_shadow and light.visibility.diffuse)
     given = [light for light in lamps if np.any(light.strength)]
     others = _other_sources(snapshot, glass, mirrors)
@@ -180,9 +177,9 @@ def bright_world(frame: Frame) -> BrightPart | None:
 
 
 def answered(frame: Frame, emitter: lights.Emitter) -> bool:
-    """Whether light of this lamp that passes glass arrives by the slot: to its shadows glass is opaque."""
+    """Whether light of this lamp that passes casters arrives by the slot: to its shadows glass is opaque."""
     found = of(frame)
-    return found is not None and bool(found.refracting) and key_of(emitter) in found.lights
+    return found is not None and key_of(emitter) in found.lights
 
 
 def key_of(emitter: lights.Emitter) -> str:
@@ -195,7 +192,7 @@ def key_of(emitter: lights.Emitter) -> str:
 def meshes_answered(frame: Frame) -> bool:
     """The same for light of emissive meshes."""
     found = of(frame)
-    return found is not None and bool(found.refracting) and MESHES in found.lights
+    return found is not None and MESHES in found.lights
 
 
 def glass_alone(frame: Frame) -> frozenset[int]:

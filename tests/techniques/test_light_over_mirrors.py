@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from addon.compare.reference import render_passes
-from addon.frame.ledger import RAN
 
 SIZE, BOUNCES = (48, 36), 8
 
@@ -105,42 +104,6 @@ def test_a_metal_wall_throws_a_lamps_light_by_its_own_lobe(stage, roughness):
     print(f"{roughness}: {ours.mean() / theirs.mean():.3f}, {error:.4f}")
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.06)
     assert error < 0.1
-
-
-def test_a_metal_wall_throws_a_lamps_light_beside_a_window_pane(stage):
-    """The pane, behind the wall and out of the lamp's way, is no caster and takes nothing from the wall's."""
-    found = []
-    for paned in (False, True):
-        stage.clear()
-        ground(stage)
-        upright(stage, 1.0, polish(stage, roughness=0.3))
-        stage.light("POINT", (-0.2, 0, 1.6), shadow_soft_size=0.5)
-        if paned:
-            window(stage, 2.5)
-        found.append(diffuse_indirect(stage, "CANDELA", 1))
-        assert stage.ledger.row("screen_space_photons").state == RAN
-    assert found[1].mean() == pytest.approx(found[0].mean(), rel=0.03)
-
-
-def window(stage, x):
-    clear = stage.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0, Color=(1, 1, 1, 1))
-    bpy.ops.mesh.primitive_cube_add(size=1, location=(x, 0, 0.8), scale=(0.01, 2, 1.6))
-    bpy.context.object.data.materials.append(clear)
-
-
-def test_a_pane_beside_rough_metal_lets_lamps_shine_through(stage):
-    """As without photons, which come from the metal alone."""
-    ground(stage)
-    upright(stage, 1.0, polish(stage, roughness=0.3))
-    window(stage, -0.8)
-    stage.light("POINT", (-0.2, 0, 1.6), shadow_soft_size=0.5)
-    found = []
-    for slot in ("AUTO", "OFF"):
-        stage.scene.candela.slot_caustics = slot
-        found.append(stage.render(4, SIZE, bounces=BOUNCES)["diffuse_direct"][..., :3])
-    behind = np.s_[:, :12]  # beyond the pane
-    assert found[1][behind].mean() > 0.01
-    assert found[0][behind].mean() == pytest.approx(found[1][behind].mean(), rel=0.02)
 
 
 def test_an_upright_mirror_sends_no_light_of_a_floor_back_to_it(stage):
