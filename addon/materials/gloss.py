@@ -9,7 +9,7 @@ import numpy as np
 from .graph import Graph, Node
 from .working_space import current
 
-THROWS = 0.5  # roughness up to which metal throws caustics: wider lobes are those of paths (LEAST_ALPHA)
+THROWS = 0.35  # roughness up to which metal throws caustics: all photons of a sample share the lobe's numbers
 SMOOTH = 0.25  # up to which photons and paths go on from it; above it gloss takes photons (shaders/caustics/gloss.glsl)
 METALLIC = 0.5  # from which on a Principled BSDF mirrors
 DARK = 0.1  # luminance of a base of which the polish above it throws more light

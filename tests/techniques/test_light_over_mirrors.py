@@ -92,7 +92,7 @@ def diffuse_indirect(stage, engine, samples, seed=1):
     return light.reshape(SIZE[1] // 4, 4, SIZE[0] // 4, 4).mean(axis=(1, 3))
 
 
-@pytest.mark.parametrize("roughness", [0.24, 0.3, 0.45])
+@pytest.mark.parametrize("roughness", [0.24, 0.3, 0.34])
 def test_a_metal_wall_throws_a_lamps_light_by_its_own_lobe(stage, roughness):
     """As photons, smooth or rough, at one sample, too. Virtual lights had .86 and .89 of it from a roughness of .25
     on, with errors of 1.2 and 1.3, and .95 and .98 at 16 samples."""
