@@ -250,8 +250,7 @@ class Photons:
         frame.kept(Reflectance).update(frame)
         self._interfaces = upload_interfaces(frame.materials.compiled, casters.going_on)
         self._parts = most_interfaces([frame.materials.compiled[k] for k in casters.refracting])
-        inner = [frame.materials.compiled[k].medium for k in casters.refracting]
-        absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
+        absorbed = [frame.materials.compiled[k].absorbed_inside for k in casters.refracting]
         self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
         self._others = sources_of(frame, casters)
 

@@ -12,6 +12,7 @@
 #include "indirect/mirror_color.glsl"
 #include "ask/media.glsl"
 #include "ask/leaving.glsl"
+#include "light/close_by.glsl"
 
 #if defined(GLASS_SHEETS) && !defined(GLASS_MIRRORS)
 #define GLASS_MIRRORS  // sheets of glass mirror from within
@@ -542,25 +543,16 @@ Reflection straight_reflection(Vertex met, Light light)
   return reflection;
 }
 
-// What emissive triangles close to a place bring that their points leave out: one at distance d counts min(1, d2 / least)
-// of its light (light_sample), so that a thin lamp on a shelf would light hardly anything of that. A cosine-distributed
-// ray meets them: one at distance d counts the rest. `light`: one of this sample's points, of which all share what they are
-// drawn by; `glass_stops`: as it does the rays to those. Returns irradiance over PI, from where the ray comes.
+// What emissive triangles close to a place bring that their points leave out (light/close_by.glsl), along a cosine-distributed
+// ray. `light`: one of this sample's points, of which all share what they are drawn by. Returns irradiance over PI, from where
+// the ray comes.
 vec3 emission_close_by(Light light, vec3 origin, vec3 normal, bool glass_stops, uint salt, out vec3 direction)
 {
   uvec3 bits = hash3(uvec3(salt, 61u, 7u));
   direction = cosine_direction(normal, vec2(to_unit(bits.x), to_unit(bits.y)));
   float level = light_edge(light);
   float spread = light_least(light) * emissive_density(light.radiance, level);  // the same of all points
-  float reach = sqrt(spread / max(level, 1e-30));
-  ivec2 hit;
-  float t = trace_layers(origin, direction, reach, 0.0, bits.z, glass_stops, false, hit);
-  if (t >= reach) {
-    return vec3(0.0);
-  }
-  vec3 ignored;
-  vec3 emission = triangle_emission(hit, direction, ignored) * layers_color(t) * passing_media(origin, direction, t, bits.z);
-  return emission * max(1.0 - t * t * emissive_density(emission, level) / spread, 0.0);
+  return emission_left_out(origin, direction, sqrt(spread / max(level, 1e-30)), spread, level, glass_stops, bits.z);
 }
 
 // What a surface reflects towards `viewer` of light straight from the sources of this sample. Of every `light_rays`-th of them

@@ -1,13 +1,11 @@
-// Light of emissive triangles so close that points on them leave it out: a point at distance d counts min(1, d2 / least) of
-// its light (light_sample), and least is `drawn_least` over what points are drawn in proportion to. A cosine-distributed ray
-// of each pixel meets such triangles: one at distance d counts the rest. Like rays to points it ends at
-// glass where photons bring what passes that (`glass_blocks`).
+// Light of emissive triangles so close that points on them leave it out (light/close_by.glsl), along a cosine-distributed ray of
+// each pixel. Like rays to points it ends at glass where photons bring what passes that (`glass_blocks`).
 #include "ask/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/brdf.glsl"
 #include "trace/rays.glsl"
-#include "ask/media.glsl"
+#include "light/close_by.glsl"
 
 void main()
 {
@@ -25,15 +23,8 @@ void main()
     return;
   }
   vec3 origin = ray_origin(s.position, s.geometric_normal);
-  ivec2 hit;
-  float t = trace_layers(origin, direction, close_reach, 0.0, salt.z + uint(film_view.sample_index), glass_blocks != 0, false, hit);
-  if (t >= close_reach) {
-    return;
-  }
-  vec3 ignored;
-  vec3 emission = triangle_emission(hit, direction, ignored);
-  float missing = max(1.0 - t * t * emissive_density(emission, mesh_light_level) / drawn_least, 0.0);
-  vec3 passing = layers_color(t) * media_transmittance(origin, direction, t, salt.x);
+  uint roll = salt.z + uint(film_view.sample_index);
+  vec3 arriving = emission_left_out(origin, direction, close_reach, drawn_least, mesh_light_level, glass_blocks != 0, roll);
   vec3 reflected = surface_diffuse_reflection(s, TO_VIEWER(s), direction) * (PI / max(dot(direction, s.normal), 1e-6));
-  out_diffuse.rgb = emission * passing * reflected * missing;
+  out_diffuse.rgb = arriving * reflected;
 }

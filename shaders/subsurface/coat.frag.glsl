@@ -44,8 +44,7 @@ int cell_met(ivec2 hit, vec3 met, vec3 direction, float instance)
   }
   vec3 normal = triangle_normal(hit);
   bool behind = dot(normal, direction) > 0.0;
-  vec4 sides = object_texel(int(instance));
-  int listed = first_object + OBJECT_TEXELS * (int((behind ? sides.y : sides.x) + 0.5) - 1);
+  int listed = first_object + OBJECT_TEXELS * (object_behind(instance, behind) - 1);
   return (listed < first_object)
          ? -1 : cell_near(met, behind ? -normal : normal, object_texel(listed + 1), object_texel(listed + 2));
 }

@@ -62,12 +62,12 @@ bool light_leaves(int material, vec3 position, vec3 normal, vec3 to_viewer, uint
   }
   int first = 2048 + 5 * chosen;
   vec4 mean = leaving_texel(first);
-  vec4 parts = leaving_texel(first + 1);
+  vec4 on_same = leaving_texel(first + 1);
   vec4 slope = leaving_texel(first + 2);
-  part = parts.xyz;
+  part = vec3(mean.w, on_same.w, slope.w);
   vec3 lean = leaving_texel(first + 4).xyz;
   vec3 aslant = vec3(dot(unpack_lean(lean.x), to_viewer), dot(unpack_lean(lean.y), to_viewer), dot(unpack_lean(lean.z), to_viewer));
   sent = mean.xyz * max(vec3(1.0) + aslant + slope.xyz * (dot(normal, to_viewer) - MEAN_COSINE_SENT), vec3(0.0));
-  same = vec3(mean.w, parts.w, slope.w);
+  same = on_same.xyz;
   return max_component(part) > 0.0;
 }

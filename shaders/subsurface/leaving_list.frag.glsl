@@ -1,6 +1,6 @@
 // Writes what leaves points into the list that subsurface/leaving.glsl reads, of sums over the samples so far, five texels for each:
-// the mean, w: red of what leaves on the same side; the part, w: green of that; the slope as a share of the mean, w: blue of
-// that; the place, w: above 0 in glass; how each channel leans, as a share of the mean.
+// the mean, w: red of the part; what leaves on the same side, w: green of that; the slope as a share of the mean, w: blue of that;
+// the place, w: above 0 in glass; how each channel leans, as a share of the mean.
 //
 // Mean and same are also means over points around, since walks of one point are few, and rays that look from a mirror or through
 // glass see the same points in every sample: what those err by would show as blotches. A walk is of one channel more than of others,
@@ -128,10 +128,10 @@ void main()
   float per = 1.0 / max(cell_same_fetch(texel).w, 1.0);
   vec3 part = per * vec3(cell_red_fetch(texel).w, cell_green_fetch(texel).w, cell_blue_fetch(texel).w);
   vec3 same = vec3(0.0);
-  vec3 sent = (kind < 3) ? sent_around(texel, same) : vec3(0.0);
+  vec3 sent = (kind < 2) ? sent_around(texel, same) : vec3(0.0);
   mat3 lean = mat3(0.0);
   vec3 slope = (kind == 2 || kind == 4) ? slope_at(texel, lean) : vec3(0.0);
-  out_texel = (kind == 0) ? vec4(sent, same.r) : (kind == 1) ? vec4(part, same.g)
-            : (kind == 2) ? vec4(slope, same.b) : (kind == 3) ? vec4(point_position_fetch(texel).xyz, cell_slope_fetch(texel).w)
+  out_texel = (kind == 0) ? vec4(sent, part.r) : (kind == 1) ? vec4(same, part.g)
+            : (kind == 2) ? vec4(slope, part.b) : (kind == 3) ? vec4(point_position_fetch(texel).xyz, cell_slope_fetch(texel).w)
             : vec4(pack_lean(lean[0]), pack_lean(lean[1]), pack_lean(lean[2]), 0.0);
 }

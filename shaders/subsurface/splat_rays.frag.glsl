@@ -20,11 +20,9 @@ void main()
   if (t >= 1e29) {
     return;
   }
-  float instance = instance_of(hit);
   vec3 normal = triangle_normal(hit);
   bool behind = dot(normal, way) > 0.0;
-  vec4 sides = object_texel(int(instance));
-  int object = int((behind ? sides.y : sides.x) + 0.5);
+  int object = object_behind(instance_of(hit), behind);
   if (object == 0 || int(box_of(object)) != group_seen) {
     return;
   }

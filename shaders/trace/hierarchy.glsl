@@ -284,8 +284,9 @@ uint boxes_met(Boxes b, vec3 origin, vec3 inverse, float reach, out vec4 enter)
 }
 
 // Colours of layers that the last ray of trace_layers has passed: each over the chance that a ray passes it at all. Three are
-// kept apart; those beyond are one, of which the nearest and the farthest distance are known. Faces of what absorbs s per metre are layers, too: a ray keeps exp(-s t) where it
-// leaves a solid after t, over exp(-s t) where it has entered it; what it enters and does not leave absorbs up to its end.
+// kept apart; those beyond are one, of which the nearest and the farthest distance are known. Faces of what absorbs s per metre
+// are layers, too: a ray keeps exp(-s t) where it leaves a solid after t, over exp(-s t) where it has entered it; what it enters
+// and does not leave absorbs up to its end.
 #ifdef TINTED_LAYERS
 #define LAYERS_KEPT 3
 #define EMISSION_TEXEL 10

@@ -19,16 +19,6 @@ from addon.surfaces.scatter_means import MEANS
 from addon.techniques.multires_radiosity import PULL
 from tests.glsl import evaluated
 
-# Of 64 x 64 directions that `reflection_sample` draws: the mean weight, the largest, and that by the cosine alone.
-SAMPLED = """
-  float sum = 0.0; float most = 0.0; float blunt = 0.0;
-  for (int i = 0; i < 64 * 64; i++) {
-    vec2 u = (vec2(i % 64, i / 64) + 0.5) / 64.0; vec3 weight;
-    reflection_sample(r, normal, viewer, u, weight);
-    sum += weight.x / (64.0 * 64.0); most = max(most, weight.x);
-    blunt = max(blunt, PI * reflection_of(r, normal, cosine_direction(normal, u), viewer).x);
-  }"""
-
 
 def with_table() -> dict:
     """Of programs that read the energy of microfacets."""
@@ -337,36 +327,54 @@ def test_of_a_caustic_map_is_kept_what_lies_on_surfaces(gpu_context):
     np.testing.assert_allclose(found[0], expected, rtol=1e-6)
 
 
+SAMPLED = """
+  float sum = 0.0; float most = 0.0; float blunt = 0.0;
+  for (int i = 0; i < 64 * 64; i++) {
+    vec2 u = (vec2(i % 64, i / 64) + 0.5) / 64.0; vec3 weight;
+    reflection_sample(r, normal, viewer, u, weight);
+    sum += weight.x / (64.0 * 64.0); most = max(most, weight.x);
+    blunt = max(blunt, PI * reflection_of(r, normal, cosine_direction(normal, u), viewer).x);
+  }"""
+SLANT = 0.02 + 0.98 * np.arange(64) / 63
+
+
+def drawn_weights(lobe, viewer):
+    """(64, 3): of 64 x 64 directions that `reflection_sample` draws of a Reflection `r`, as `lobe` sets it, the mean
+    weight, the largest, and the largest by the cosine alone; the viewer at each of SLANT."""
+    lobe = f"Reflection r; {lobe} float slant = 0.02 + 0.98 * k; vec3 normal = vec3(0.0, 0.6, 0.8);"
+    return evaluated(
+        "lib/gbuffer.glsl lib/brdf.glsl indirect/albedo.glsl",
+        "vec4(sum, most, blunt, 0.0)",
+        before=f"{lobe} vec3 viewer = {viewer};{SAMPLED}",
+        **with_table(),
+    )
+
+
+def hemisphere():
+    """Cosines (400, 1) to the normal and turns (400,), 0..pi, of light from one half, and weights (400,) of the former,
+    which sum to 2."""
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    return (nodes[:, None] + 1) / 2, np.pi * np.arange(0.5, 400) / 400, weights
+
+
 def test_paths_leave_by_the_lobe_with_its_energy_and_never_far_too_bright(gpu_context):
     """What a point draws of light from all sides is, in the mean, its integral over directions, at every slant; and no
     direction weighs much more than the mean, of which the cosine's own density made hundreds at grazing views."""
-    before = (
-        """Reflection r; r.diffuse = vec3(0.1); r.through = vec3(0.0); r.rough = 0.0;
-  r.straight = vec3(0.6);
-  r.grazing = vec3(0.9); r.alpha = 0.25; float slant = 0.02 + 0.98 * k; vec3 normal = vec3(0.0, 0.6, 0.8);
-  vec3 viewer = slant * normal + sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0);
-"""
-        + SAMPLED
+    found = drawn_weights(
+        "r.diffuse = vec3(0.1); r.through = vec3(0.0); r.rough = 0.0; r.straight = vec3(0.6); r.grazing = vec3(0.9);"
+        "r.alpha = 0.25;",
+        "slant * normal + sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0)",
     )
-    found = evaluated(
-        "lib/gbuffer.glsl lib/brdf.glsl indirect/albedo.glsl",
-        "vec4(sum, most, blunt, 0.0)",
-        before=before,
-        **with_table(),
-    )
-    slant = 0.02 + 0.98 * np.arange(64) / 63
-    nodes, weights = np.polynomial.legendre.leggauss(400)
-    high = (nodes[:, None] + 1) / 2  # cosine between light and normal
-    turn = np.pi * np.arange(0.5, 400) / 400
+    high, turn, weights = hemisphere()
     for k in (0, 1, 5, 20, 63):
-        viewer = np.array([np.sqrt(1 - min(slant[k], 1.0) ** 2), 0.0, slant[k]])
+        viewer = np.array([np.sqrt(1 - min(SLANT[k], 1.0) ** 2), 0.0, SLANT[k]])
         aside = np.sqrt(1 - high**2)
         light = np.stack([aside * np.cos(turn), aside * np.sin(turn), high + 0 * turn], axis=-1)
         middle = light + viewer
         middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
         squared = 0.25**2
         distribution = squared / np.pi / (middle[..., 2] ** 2 * (squared - 1) + 1) ** 2
-        nl, nv = light[..., 2], slant[k]
+        nl, nv = light[..., 2], SLANT[k]
         masked = nl * np.sqrt(nv**2 * (1 - squared) + squared) + nv * np.sqrt(nl**2 * (1 - squared) + squared)
         fresnel = 0.6 + 0.3 * np.clip(1 - (light * middle).sum(axis=-1), 0, 1) ** 5
         reflected = 0.1 / np.pi + fresnel * distribution * 0.5 / masked
@@ -379,27 +387,15 @@ def test_paths_through_strands_leave_ahead_and_never_far_too_bright(gpu_context)
     """Behind a strand that light shines through: the mean of what is drawn is the integral over directions, at every
     slant of the view, and no weight is twice as large as all that arrives, where the cosine's own density makes 4.5."""
     n = 9.0
-    before = (
-        f"""Reflection r; r.diffuse = vec3(1.0); r.through = vec3(1.0); r.rough = -0.01;
-  r.straight = vec3(0.0); r.grazing = vec3(0.0); r.alpha = {n};
-  float slant = 0.02 + 0.98 * k; vec3 normal = vec3(0.0, 0.6, 0.8);
-  vec3 viewer = sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0) - slant * normal;
-"""
-        + SAMPLED
+    found = drawn_weights(
+        "r.diffuse = vec3(1.0); r.through = vec3(1.0); r.rough = -0.01; r.straight = vec3(0.0); r.grazing = vec3(0.0);"
+        f"r.alpha = {n};",
+        "sqrt(max(1.0 - slant * slant, 0.0)) * vec3(1.0, 0.0, 0.0) - slant * normal",
     )
-    found = evaluated(
-        "lib/gbuffer.glsl lib/brdf.glsl indirect/albedo.glsl",
-        "vec4(sum, most, blunt, 0.0)",
-        before=before,
-        **with_table(),
-    )
-    slant = 0.02 + 0.98 * np.arange(64) / 63
-    nodes, weights = np.polynomial.legendre.leggauss(400)
-    high = (nodes[:, None] + 1) / 2
-    turn = np.pi * np.arange(0.5, 400) / 400
+    high, turn, weights = hemisphere()
     aside = np.sqrt(1 - high**2)
     for k in (0, 5, 20, 63):
-        ahead = slant[k] * high - np.sqrt(1 - min(slant[k], 1.0) ** 2) * aside * np.cos(turn)
+        ahead = SLANT[k] * high - np.sqrt(1 - min(SLANT[k], 1.0) ** 2) * aside * np.cos(turn)
         scattered = (1 + 0.39 * n) * (0.5 + 0.5 * ahead) ** n * high
         np.testing.assert_allclose(found[k, 0], (scattered.mean(axis=1) * weights).sum(), rtol=0.01)
     assert found[:, 1].max() < 2.0 < 4.4 < found[:, 2].max()
