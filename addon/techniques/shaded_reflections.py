@@ -291,10 +291,10 @@ class ShadedReflections(Technique, BothWays):
             self._first_rays = CANDIDATES * WORLD_DIRECTIONS / of_first if of_first else 0.0
             graphs = [frame.snapshot.materials[slot].graph for slot in frame.snapshot.used_materials]
             smoothest = min((0.0 if may_refract(one) else least_roughness(one) for one in graphs), default=np.inf)
-            self._onward = smoothest <= ONWARD_ROUGHNESS
-            self._any_ray = smoothest <= limit
-            for rays, least in (("1 bounce", ONWARD_ROUGHNESS), ("none", limit)):
-                if smoothest > least:
+            # In single precision, as shaders compare: there a socket's .4 is this .4, which it exceeds here.
+            self._onward, self._any_ray = (smoothest <= np.float32(least) for least in (ONWARD_ROUGHNESS, limit))
+            for rays, least, has in (("1 bounce", ONWARD_ROUGHNESS, self._onward), ("none", limit, self._any_ray)):
+                if not has:
                     frame.account.chose(self, "rays", f"{rays}, because no material is smoother than {least:g}")
         self._guides = tuple(name for name in (SHOWN, SHOWN_THROUGH) if name in frame.images)
         guide = self._guides if frame.settings.samples > 1 else ()

@@ -8,7 +8,7 @@ from addon.compare.passes import light_paths
 from addon.frame.shares import Turns
 from addon.gfx import images
 from addon.techniques import shaded_reflections
-from addon.techniques.shaded_reflections import ShadedReflections
+from addon.techniques.shaded_reflections import GATHERED_FROM, ShadedReflections
 from bench.shading import chequer
 
 from .conftest import places
@@ -304,6 +304,19 @@ def test_rays_from_elsewhere_in_a_pixel_keep_to_its_own_surface(stage, shader):
     found = stage.render(1, SIZE, bounces=16)["combined"][..., :3]
     assert found.mean() == pytest.approx(1.0, abs=5e-3)
     assert np.abs(found - 1.0).mean() < 0.01
+
+
+def test_gloss_on_the_bound_of_what_is_gathered_has_its_light(stage):
+    """Metal of roughness .4 before a wall: in single precision that exceeds Python's .4, and equals a shader's."""
+    stage.rectangle((-4, 0), (4, 4), material=stage.diffuse(0.8), location=(0, 3, 0), turn=(np.pi / 2, 0, 0))
+    stage.light("POINT", (0, 0, 3), energy=200.0)
+    stage.camera((0, -5, 3), (1.2, 0, 0), angle=0.9)
+    floor, found = stage.rectangle((-4, -4), (4, 4)), []
+    for roughness in (GATHERED_FROM, GATHERED_FROM + 0.01):
+        floor.data.materials.clear()
+        floor.data.materials.append(stage.principled(Metallic=1.0, Roughness=roughness))
+        found.append(stage.render(4, (16, 12), bounces=1)["glossy_indirect"][..., :3].mean())
+    assert found[0] == pytest.approx(found[1], rel=0.1) and found[1] > 1e-3
 
 
 @pytest.mark.parametrize("beside, gathered", [(0.42, True), (0.05, False)])
