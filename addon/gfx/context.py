@@ -38,13 +38,27 @@ def begin_picture() -> None:
         function()
 
 
+_enters: list[Callable[[], None]] = []
 _leaves: list[Callable[[], None]] = []
+
+
+def on_enter(function: Callable[[], None]) -> Callable[[], None]:
+    """Register (as a decorator) what begins work in a GPU context that is not this process's only one."""
+    _enters.append(function)
+    return function
 
 
 def on_leave(function: Callable[[], None]) -> Callable[[], None]:
     """Register (as a decorator) what ends work in a GPU context that is not this process's only one."""
     _leaves.append(function)
     return function
+
+
+def enter() -> None:
+    """Work in the current GPU context begins, after some in another one."""
+    if available():
+        for function in _enters:
+            function()
 
 
 def leave() -> None:

@@ -198,6 +198,7 @@ def lasting_context():
     before = getattr(_thread, "framebuffers", None)
     _thread.framebuffers = _lasting
     try:
+        context.enter()
         yield
     finally:
         try:
@@ -226,6 +227,7 @@ def passing_context():
     before = getattr(_thread, "framebuffers", None)
     _thread.framebuffers = _Framebuffers()
     try:
+        context.enter()
         yield
     finally:
         try:

@@ -9,10 +9,10 @@ from functools import lru_cache
 import gpu
 import numpy as np
 
-from .context import on_leave, on_release, overtakes_draws
+from .context import on_enter, on_leave, on_picture, on_release, overtakes_draws
 from .device import computes_beat_fragments
 from .geometry import Batch, vertex_buffer
-from .images import Image, Target, borrowed, finish, lasts
+from .images import Image, Target, borrowed, finish, lasts, upload
 from .library import FULLSCREEN_VERTEX, MOST_TEXTURES, Program, Shader, get
 
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
@@ -108,31 +108,64 @@ def fullscreen(
     gpu.shader.unbind()
 
 
+_UNITS = tuple(f"unit_{k}" for k in range(MOST_TEXTURES))  # of textures: no program reads more
+
+
+def _last_drawn(name: str, value: str, units: tuple[str, ...]) -> Program:
+    return fullscreen_program(
+        name, "generated/main", textures=tuple(("FLOAT_2D", unit) for unit in units), outputs=(("VEC4", "out_color"),),
+        snippets=(("generated/main", f"void main() {{ out_color = {value}; }}"),),
+    )  # fmt: skip
+
+
 # Two, of which one has not been drawn last, whatever happened in between.
-LAST_DRAWN = tuple(
-    fullscreen_program(
-        f"last drawn {k}", "generated/main", outputs=(("VEC4", "out_color"),),
-        snippets=(("generated/main", f"void main() {{ out_color = vec4({k}.0); }}"),),
-    )
-    for k in range(2)
-)  # fmt: skip
+LAST_DRAWN = (
+    _last_drawn("last drawn 0", " + ".join(f"{unit}_fetch(ivec2(0))" for unit in _UNITS), _UNITS),
+    _last_drawn("last drawn 1", "vec4(1.0)", ()),
+)
 _last: list[Shader] = []
+_blank: list[Image] = []
+
+
+def _bind_blanks() -> None:
+    """Bind the first of those programs, and an image that stays to each unit of textures."""
+    if not _last:
+        _last.extend(Shader(program) for program in LAST_DRAWN)
+        _blank.append(upload(np.zeros((1, 1, 4), np.float32)))
+    for shader in _last:
+        shader.kept.lasts = shader.kept.lasts or lasts()
+    _last[0].bind(textures=dict.fromkeys(_UNITS, _blank[0]))
+
+
+@on_enter
+def _forget_textures() -> None:
+    """Bind what stays to each unit of textures. OpenGL gives a new texture the name of one that was freed, and Blender
+    binds none whose name is bound already: where another context has freed that, it is still the old one, which
+    would be read in place of the new one."""
+    if gpu.platform.backend_type_get() == "OPENGL":
+        _bind_blanks()
+        gpu.shader.unbind()
+
+
+@on_picture
+def _forget_textures_of_renders() -> None:
+    """The same where contexts of final renders come and go beside one that nobody enters."""
+    if _last:
+        _forget_textures()
 
 
 @on_leave
 def _let_go() -> None:
-    """Draw programs that stay until all are released. OpenGL's contexts hold the one that they drew last until they
-    draw another: freed meanwhile elsewhere it would end here, in a context that may not free it (see library.py)."""
+    """Draw programs that stay until all are released, with images that stay. OpenGL's contexts hold the program that
+    they drew last until they draw another: freed meanwhile elsewhere it would end here, in a context that may not free
+    it (see library.py). They hold what is bound, too."""
     if gpu.platform.backend_type_get() != "OPENGL":
         return
-    if not _last:
-        _last.extend(Shader(program) for program in LAST_DRAWN)
-    with borrowed(1, 1, "RGBA32F") as target:
-        for shader in _last:
-            shader.kept.lasts = shader.kept.lasts or lasts()
-            with _state(target):
-                shader.bind()
-                _fullscreen_batch().draw(shader.handle)
+    with borrowed(1, 1, "RGBA32F") as target, _state(target):
+        _bind_blanks()
+        _fullscreen_batch().draw(_last[0].handle)
+        _last[1].bind()
+        _fullscreen_batch().draw(_last[1].handle)
     gpu.shader.unbind()
 
 
@@ -301,3 +334,4 @@ def _release() -> None:
     _triangle.clear()
     _quad.clear()
     _last.clear()
+    _blank.clear()

@@ -36,7 +36,7 @@ PIXEL = "8"  # of the screen, for one of the picture
 PAUSE_S = 0.02
 WHOLE = 50.0 * (2.0 - math.sqrt(2.0))  # Blender's zoom at which the camera's frame fills the region
 SAME = 0.03  # of a value, between two pictures: rays search trees that were refitted, or are made anew
-MOST_OTHER = 0.02  # of all blocks may differ by more
+MOST_OTHER, MOST_MEAN = 0.02, 0.01  # of all blocks may differ by more, and the picture's mean by so much
 before = []  # the picture before the last edit
 
 
@@ -81,8 +81,14 @@ def stage_scene():
     space.shading.type = "RENDERED"
 
 
+def held(viewport):
+    """The images of a viewport's frame by name."""
+    read, frame = candela().images.read, viewport.frame
+    return {name: read(frame.held.to_show(name)) for name in frame.images}
+
+
 def fresh():
-    """The picture of the viewport as one that has kept nothing would show it; (H, W, 4)."""
+    """The picture of the viewport as one that has kept nothing would show it, (H, W, 4), and the frame's images."""
     module, shown = candela(), viewports()[0]
     space = viewport_area().spaces.active
     other = module.Viewport()
@@ -104,7 +110,7 @@ def fresh():
         with module.images.passing_context():
             while not other.done:
                 other.draw_frame(source, camera, size, settings, border=border)
-            found = module.images.read(other.picture)
+            found = module.images.read(other.picture), held(other)
             other.release()
     return found
 
@@ -119,8 +125,8 @@ def compared(name):
     """Note how much the picture at rest differs from a fresh one."""
     module = candela()
     with module.images.passing_context():
-        kept = module.images.read(viewports()[0].picture)
-    anew = fresh()
+        kept, kept_images = module.images.read(viewports()[0].picture), held(viewports()[0])
+    anew, anew_images = fresh()
     if kept.shape != anew.shape:
         result["edits"][name] = {"shapes": [kept.shape, anew.shape]}
         return
@@ -135,8 +141,12 @@ def compared(name):
         note["changed"] = float(np.abs(kept - before[-1]).mean() / max(anew[..., :3].mean(), 1e-3))
     before[:] = [kept]
     result["edits"][name] = note
-    if note["other"] > MOST_OTHER:
-        np.savez(FOLDER / f"{name}.npz", kept=kept, fresh=anew)
+    if note["other"] > MOST_OTHER or mean > MOST_MEAN:
+        again, again_images = fresh()  # whether the first fresh one was wrong itself
+        pictures = {"kept": kept, "fresh": anew, "again": again}
+        found = {"kept": kept_images, "fresh": anew_images, "again": again_images}
+        pictures |= {f"{who}:{what}": one for who, several in found.items() for what, one in several.items()}
+        np.savez(FOLDER / f"{name}.npz", **pictures)
 
 
 def steps():
