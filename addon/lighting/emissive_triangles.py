@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import or_
 
 import numpy as np
 
@@ -92,6 +94,7 @@ class EmissiveTriangles:
         self.corners, source = self.corners[order], source[order]
         self.radiance, self.sided, self.flags = self.radiance[source], self.sided[source], self.flags[source]
         self.unlit, self.passing = [self.unlit[k] for k in source], [self.passing[k] for k in source]
+        self._unlit_by_some = reduce(or_, self.unlit, 0) // lights.KIND_STEPS
         weight = np.abs(self.radiance) @ lights.LUMINANCE * double_area / 2
         weight = np.where(np.isfinite(weight), weight, 0.0)
         shining = np.where(weight > 0.0, double_area / 2, 0.0)
@@ -175,7 +178,7 @@ class EmissiveTriangles:
         normal, radiance = self.normal[k], self.radiance[k]
         row = lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
         row[lights.LIGHT.at.kind] += self.unlit[k]
-        row[lights.LIGHT.at.edge] = self.level
+        row[lights.LIGHT.at.edge], row[lights.LIGHT.at.cone] = self.level, self._unlit_by_some
         if at_hits:
             row[lights.LIGHT.at.first_view] = lights.passing_bits(self.passing[k])
         return row

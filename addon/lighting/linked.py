@@ -54,8 +54,12 @@ LINKS = Interface("links", "light/links.glsl", (("R32F", "receiver_groups"),), l
 
 
 def has_links(rows: list[np.ndarray]) -> bool:
-    """Whether any of these lights, (TEXELS, 4) each, leaves out receivers."""
-    return any(int(row[lights.LIGHT.at.kind]) >= lights.KIND_STEPS for row in rows)
+    """Whether any of these lights, (TEXELS, 4) each, leaves out receivers, or any emissive mesh where one of them is a
+    point on such a mesh."""
+    at = lights.LIGHT.at
+    kinds = [int(row[at.kind]) for row in rows]
+    by_meshes = (kind == lights.SURFACE and row[at.cone] > 0.0 for kind, row in zip(kinds, rows))
+    return max(kinds, default=0) >= lights.KIND_STEPS or any(by_meshes)
 
 
 def linked(

@@ -29,7 +29,9 @@ LIGHT = Record(
         ("vec3 axis", "float spread"),  # of emission, unit; tan of the half spread, 0: Lambertian
     ),
     asked=(
-        ("vec3 u", "float cone"),  # half width of an area light, or row of a spot's inverse matrix; cosine of half cone
+        # Half width of an area light, or row of a spot's inverse matrix; cosine of half cone, or of a point on a
+        # surface the groups of receivers that some emissive mesh does not light, a bit each.
+        ("vec3 u", "float cone"),
         # Half height, or row; 1 / ((1 - cosine) blend), 0: a hard edge, or of a point on a surface
         # EmissiveTriangles.level, W / (m2 sr).
         ("vec3 v", "float edge"),

@@ -58,11 +58,10 @@ vec3 light_close_by(Receiver r, Light light, uint salt)
 }
 
 // By a point on one of the sources, drawn in proportion to what it brings unblocked. `emissive`: a point on an emissive surface,
-// below 0 where there is none or one of them leaves this receiver unlit: a ray would not tell which it meets.
+// below 0 where there is none or some mesh leaves this receiver unlit.
 vec3 light_of_points(Receiver r, uint salt, out int emissive)
 {
   emissive = -1;
-  bool all_linked = true;
   float total = 0.0;
   float chosen_share = 0.0;
   int chosen = -1;
@@ -73,7 +72,6 @@ vec3 light_of_points(Receiver r, uint salt, out int emissive)
     Light light = light_read(i);
 #ifdef HAS_RECEIVER_GROUPS
     if (((light.unlit >> r.group) & 1) != 0) {
-      all_linked = all_linked && !LIGHT_IS(light, LIGHT_SURFACE);
       continue;
     }
 #endif
@@ -94,7 +92,9 @@ vec3 light_of_points(Receiver r, uint salt, out int emissive)
       chosen_direction = direction;
     }
   }
-  emissive = all_linked ? emissive : -1;
+#ifdef HAS_RECEIVER_GROUPS
+  emissive = (emissive >= 0 && some_mesh_leaves_out(light_read(emissive), r.group)) ? -1 : emissive;
+#endif
   if (!(total > DARK) || chosen < 0) {
     return vec3(0.0);
   }

@@ -555,6 +555,13 @@ vec3 emission_close_by(Light light, vec3 origin, vec3 normal, bool glass_stops, 
   return emission_left_out(origin, direction, sqrt(spread / max(level, 1e-30)), spread, level, glass_stops, bits.z);
 }
 
+// Whether some emissive mesh, drawn in this sample or not, leaves this group of receivers unlit: a ray that looks for triangles
+// close by would not tell which mesh it meets. `light`: a point on any of them.
+bool some_mesh_leaves_out(Light light, int group)
+{
+  return ((int(light_cone(light)) >> group) & 1) != 0;
+}
+
 // What a surface reflects towards `viewer` of light straight from the sources of this sample. Of every `light_rays`-th of them
 // one is traced, drawn in proportion to what it brings unblocked: only visibility is sampled. All are weighed before any
 // is traced: pixels that a processor runs together then trace together.
@@ -568,7 +575,6 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
   vec3 sum = met.leaving;
   uint roll = salt;
   int emissive = -1;  // a point on an emissive surface
-  bool all_linked = true;  // no such surface leaves this one unlit: a ray would not tell which it meets
   for (int group = 0; group < min(light_rays, light_count); group++) {
     float total = 0.0;
     float chosen_share = 0.0;
@@ -580,7 +586,6 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
 #ifdef HIT_LINKS
       int kind = int(sources.light[i * LIGHT_TEXELS].x);
       if (((kind >> 4 >> met.group) & 1) != 0) {
-        all_linked = all_linked && (kind & 15) != LIGHT_SURFACE;
         continue;
       }
 #endif
@@ -609,8 +614,11 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
              * (total / chosen_share);
     }
   }
+#ifdef HIT_LINKS
+  emissive = (emissive >= 0 && some_mesh_leaves_out(light_read(emissive), met.group)) ? -1 : emissive;
+#endif
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
-  for (; emissive >= 0 && all_linked; emissive = -1) {
+  for (; emissive >= 0; emissive = -1) {
     Light light = light_read(emissive);
     vec3 direction;
     vec3 arriving = emission_close_by(light, origin, normal, false, salt, direction);

@@ -297,3 +297,28 @@ def test_a_mirror_shows_a_board_dark_that_a_lamp_touching_it_leaves_out(room):
         lamp.light_linking.receiver_collection = links
         seen.append(room.render(4, (12, 12), bounces=1)["glossy_indirect"][5:7, :, :3].mean())
     assert seen[0] > 0.5 and seen[1] == 0.0
+
+
+def test_a_weak_lamp_touching_a_board_that_it_leaves_out_is_not_found_beside_a_strong_one(room):
+    """On which most samples draw all of their points: those of the weak one would tell of its links."""
+    for one in (*room.scene.objects,):
+        bpy.data.objects.remove(one)
+    weak, strong = (room.material("ShaderNodeEmission", Strength=strength) for strength in (1.0, 1000.0))
+    touching = room.mesh([(-1, 0, 1), (1, 0, 1), (1, 0, 0.99), (-1, 0, 0.99)], [(0, 1, 2, 3)], material=weak)
+    room.rectangle((-1, -1), (1, 1), material=strong, location=(20, 0, -5))
+    corners = [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]
+    board = room.mesh(corners, [(0, 1, 2, 3)], material=room.diffuse(1.0))
+    room.rectangle((-1, -1), (1, 1), material=room.principled(Metallic=1.0, Roughness=0.0))
+    camera = room.camera((0, 0, 0.5), (0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.2
+
+    def seen():
+        return room.render(4, (12, 12), bounces=1)["glossy_indirect"][5:7, :, :3].mean()
+
+    lit = seen()
+    touching.light_linking.receiver_collection = collection([board], "EXCLUDE")
+    left_out = seen()
+    touching.hide_render = True
+    expected = seen()
+    print(f"{lit:.4f}, left out {left_out:.4f}, without the lamp {expected:.4f}")
+    assert lit > 1.1 * expected and left_out == pytest.approx(expected, rel=0.05)
