@@ -27,6 +27,7 @@ from .visibility import (
     VisibilityProvider,
     by_rays,
     drawn_stochastically,
+    glass_absorbs,
     map_resolution,
     ray_bindings,
     rounds,
@@ -108,7 +109,7 @@ class PointMaps(Technique, VisibilityProvider):
         """Whether rays take the place of this light's maps."""
         return by_rays(
             frame, lambda: self.views(frame, emitter, emitter.middle(), 0), self.resolution(frame), self,
-            emitter.light.name if emitter.light else "light",
+            emitter.light.name if emitter.light else "light", glass_absorbs(frame) and not answered(frame, emitter),
         )  # fmt: skip
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:

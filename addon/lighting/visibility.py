@@ -227,6 +227,13 @@ def drawn_stochastically(frame: Frame, stopped: frozenset[int] = frozenset()) ->
     return [draw for draw in frame.geometry.draws if draw.material in casting]
 
 
+def glass_absorbs(frame: Frame) -> bool:
+    """Whether some caster is glass whose inside absorbs: of light that passes it straight maps do not know how far that
+    goes through it, rays do."""
+    compiled = frame.materials.compiled
+    return any(any(compiled[draw.material].absorbed_inside) for draw in drawn_stochastically(frame))
+
+
 def by_rays(
     frame: Frame,
     views: Callable[[], list],

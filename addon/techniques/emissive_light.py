@@ -60,6 +60,7 @@ from ..lighting.visibility import (
     ShadowLinks,
     VisibilityProvider,
     by_rays,
+    glass_absorbs,
     map_resolution,
     ray_bindings,
 )
@@ -187,8 +188,9 @@ class EmissiveLight(Technique):
                 continue
             if self._traced is None:  # by the picture's first point that asks no other
                 self._traced = by_rays(
-                    frame, lambda place=point: _views(frame, place, 0, resolution), resolution, self, "emissive meshes"
-                )
+                    frame, lambda place=point: _views(frame, place, 0, resolution), resolution, self, "emissive meshes",
+                    glass_absorbs(frame) and not blocked,
+                )  # fmt: skip
             views = [] if self._traced else _views(frame, point, number, resolution)
             views = [replace(view, glass_blocks=True) for view in views] if blocked else views
             row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)

@@ -61,6 +61,7 @@ from ..lighting.visibility import (
     Rays,
     VisibilityProvider,
     by_rays,
+    glass_absorbs,
     map_resolution,
     ray_bindings,
 )
@@ -271,8 +272,8 @@ class EnvironmentLight(Technique):
 
     def _traces(self, frame: Frame, resolution: int) -> bool:
         """Whether rays take the place of maps."""
-        below = _has_sheets(frame)
-        return by_rays(frame, lambda: self._usual_views(frame, resolution), resolution, self, "the world", below)
+        needed = _has_sheets(frame) or glass_absorbs(frame)
+        return by_rays(frame, lambda: self._usual_views(frame, resolution), resolution, self, "the world", needed)
 
     @staticmethod
     def _usual_views(frame: Frame, resolution: int) -> list:

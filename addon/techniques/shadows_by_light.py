@@ -47,7 +47,13 @@ from ..lighting.point_maps import PointMaps
 from ..lighting.shadow_costs import Foreseen, Weighed
 from ..lighting.silhouettes import Extent
 from ..lighting.soft_maps import SoftMaps
-from ..lighting.visibility import VisibilityProvider, drawn_stochastically, has_extent, rays_beside
+from ..lighting.visibility import (
+    VisibilityProvider,
+    drawn_stochastically,
+    glass_absorbs,
+    has_extent,
+    rays_beside,
+)
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from .accumulated_maps import AccumulatedMaps
@@ -153,7 +159,8 @@ class ShadowsByLight(PointMaps):
         kinds, soft = {}, []
         for emitter in emitters:
             sharp = penumbra(frame, emitter) * self._providers[PLAIN].resolution(frame) < 1.0
-            if sharp or self._is_seen_in_parts(frame, emitter):
+            absorbed = glass_absorbs(frame) and not answered(frame, emitter)
+            if sharp or absorbed or self._is_seen_in_parts(frame, emitter):
                 kinds[emitter.light.key] = PLAIN
             else:
                 soft.append(emitter)

@@ -169,7 +169,8 @@ float tile_opacity(ivec2 hit, float code, bool front, bool to_lamp, vec3 positio
 }
 #endif
 
-// The share of rays that four triangles stop, met at the distances `t`, of those before `limit`. Codes are negative where the
+// The share of rays that four triangles stop, met at the distances `t`, of those before `limit`; below 0 where such rays do not
+// meet them. Codes are negative where the
 // triangle may also bend what meets it; they hold which rays it is about, 0: all, 1: not those that look for a light, 2:
 // those alone, 3: all, and those for certain (glass: those that it is a sheet for, by the side that they meet); and the
 // coverage of either side, or, if MAPPED, of which tile.
@@ -198,7 +199,7 @@ vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction,
   if (bent) {
     opacity = mix(opacity, vec4(1.0), lessThan(code, vec4(0.0)));
   }
-  opacity = mix(opacity, vec4(0.0), equal(stopped, vec4(shadow ? 1.0 : 2.0)));
+  opacity = mix(opacity, vec4(-1.0), equal(stopped, vec4(shadow ? 1.0 : 2.0)));
   last = vec4(equal(stopped, vec4(3.0)));
   return shadow ? mix(opacity, vec4(1.0), last * (vec4(1.0) - glass)) : opacity;
 }
@@ -340,8 +341,7 @@ void layers_pass(int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec
   int base = leaf * LEAF_TEXELS + EMISSION_TEXEL;
   vec4 red = leaf_texel(base);
   for (int i = 0; i < 4; i++) {
-    // Of no opacity at all are those that such rays do not meet.
-    if (t[i] < limit && !stops[i] && opacity[i] > 0.0 && red[i] <= -TINT_CODE) {
+    if (t[i] < limit && !stops[i] && opacity[i] >= 0.0 && red[i] <= -TINT_CODE) {
       vec3 told = vec3(red[i], leaf_texel(base + 1)[i], leaf_texel(base + 2)[i]);
       vec3 color = -told - TINT_CODE;
 #ifdef ABSORBING_LAYERS

@@ -253,6 +253,36 @@ def test_bounced_light_is_absorbed_in_glass_that_it_passes(stage):
     assert found[1] / found[0] == pytest.approx(np.array(expected), rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("kind", "samples"),
+    [("SUN", 1), ("SUN", 4), ("AREA", 1), ("AREA", 4), ("MESH", 1), ("MESH", 4), ("WORLD", 64)],
+)  # fmt: skip
+def test_light_of_sources_is_absorbed_in_glass_that_it_passes_straight(stage, kind, samples):
+    """Below a wide slab that bends nothing."""
+    per_metre, thick, found = np.array((2.0, 0.5, 0.0)), 0.4, []
+    for filled in (False, True):
+        stage.clear()
+        stage.scene.candela.slot_indirect = "OFF"
+        stage.rectangle((-1, -1), (1, 1), material=stage.diffuse(0.8))
+        if kind == "WORLD":
+            stage.world((1, 1, 1))
+        elif kind == "MESH":
+            shining = stage.material("ShaderNodeEmission", Strength=1000.0)
+            stage.rectangle((-0.5, -0.5), (0.5, 0.5), 20.0, material=shining).visible_camera = False
+        elif kind == "AREA":
+            stage.light("AREA", (0, 0, 20.0), energy=1e4, size=1.0)
+        else:
+            stage.light("SUN", angle=0.01)
+        if filled:
+            slab = absorbing_glass(stage, per_metre, ior=1.0)
+            box(stage, slab, (-60, -60, 0.5), (60, 60, 0.5 + thick)).visible_camera = False
+        stage.camera_above(0.2)
+        found.append(stage.render(samples, (8, 8), bounces=2)["combined"][..., :3].mean((0, 1)))
+    cosine = np.sqrt((np.arange(1000) + 0.5) / 1000) if kind == "WORLD" else np.ones(1)
+    expected = [np.exp(-a * thick / cosine).mean() for a in per_metre]
+    assert found[1] / found[0] == pytest.approx(np.array(expected), rel=0.04)
+
+
 def test_light_of_a_lamp_in_glass_is_absorbed_on_its_way_out(stage):
     """In the middle of a wide slab: all light of the floor and the wall far below it has passed half of that, and the
     quotients of its colours say by what. Rays that end in the slab lost nothing there."""
