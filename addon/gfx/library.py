@@ -38,7 +38,7 @@ _FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D")
 _FORMATS |= dict.fromkeys(("RGBA32UI", "R32UI"), "UINT_2D")
 _SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D", *_FORMATS}
 MOST_TEXTURES = 16  # of a program
-_MOST_IMAGES = 8  # that Blender binds at once
+MOST_IMAGES = 8  # that Blender binds at once
 _PUSH_BYTES = {"FLOAT": 4, "VEC2": 8, "VEC3": 12, "VEC4": 16, "INT": 4, "IVEC2": 8, "IVEC4": 16, "MAT4": 64, "BOOL": 4}
 _MOST_PUSH_BYTES = 128  # that every Vulkan driver has; of more, Blender complains
 
@@ -124,7 +124,7 @@ class Program:
         """Textures that are bound as images, because this driver loads faster than it fetches."""
         if not loads_beat_fetches() or self.vertex not in ("", FULLSCREEN_VERTEX):
             return ()
-        return tuple(name for kind, name in self.textures if kind in _FORMATS)[: _MOST_IMAGES - len(self.images)]
+        return tuple(name for kind, name in self.textures if kind in _FORMATS)[: MOST_IMAGES - len(self.images)]
 
 
 GENERATED: dict[str, str] = {}  # texts that sources include like files, by name: see records.py

@@ -9,11 +9,11 @@ from functools import lru_cache
 import gpu
 import numpy as np
 
-from .context import on_enter, on_leave, on_picture, on_release, overtakes_draws
+from .context import is_only_one, on_enter, on_leave, on_picture, on_release, overtakes_draws
 from .device import computes_beat_fragments
 from .geometry import Batch, vertex_buffer
 from .images import Image, Target, borrowed, finish, lasts, upload
-from .library import FULLSCREEN_VERTEX, MOST_TEXTURES, Program, Shader, get
+from .library import FULLSCREEN_VERTEX, MOST_IMAGES, MOST_TEXTURES, Program, Shader, get
 
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
 FULLSCREEN_VARYINGS = (("smooth", "VEC2", "screen"),)
@@ -108,65 +108,52 @@ def fullscreen(
     gpu.shader.unbind()
 
 
-_UNITS = tuple(f"unit_{k}" for k in range(MOST_TEXTURES))  # of textures: no program reads more
-
-
-def _last_drawn(name: str, value: str, units: tuple[str, ...]) -> Program:
-    return fullscreen_program(
-        name, "generated/main", textures=tuple(("FLOAT_2D", unit) for unit in units), outputs=(("VEC4", "out_color"),),
-        snippets=(("generated/main", f"void main() {{ out_color = {value}; }}"),),
-    )  # fmt: skip
-
-
-# Two, of which one has not been drawn last, whatever happened in between.
-LAST_DRAWN = (
-    _last_drawn("last drawn 0", " + ".join(f"{unit}_fetch(ivec2(0))" for unit in _UNITS), _UNITS),
-    _last_drawn("last drawn 1", "vec4(1.0)", ()),
+# All units of textures and of images: no program reads more.
+_TEXTURES = tuple(f"texture_{k}" for k in range(MOST_TEXTURES))
+_IMAGES = tuple(f"image_{k}" for k in range(MOST_IMAGES))
+_SUM = " + ".join(
+    (*(f"{name}_fetch(ivec2(0))" for name in _TEXTURES), *(f"imageLoad({name}, ivec2(0))" for name in _IMAGES))
 )
+# Two, of which one has not been drawn last, whatever happened in between.
+LAST_DRAWN = tuple(
+    fullscreen_program(
+        f"last drawn {k}", "generated/main", textures=tuple(("FLOAT_2D", name) for name in textures),
+        images=tuple((name, "RGBA32F", "FLOAT_2D", "READ") for name in images), outputs=(("VEC4", "out_color"),),
+        snippets=(("generated/main", f"void main() {{ out_color = {value}; }}"),),
+    )
+    for k, (textures, images, value) in enumerate(((_TEXTURES, _IMAGES, _SUM), ((), (), "vec4(1.0)")))
+)  # fmt: skip
 _last: list[Shader] = []
 _blank: list[Image] = []
 
 
-def _bind_blanks() -> None:
-    """Bind the first of those programs, and an image that stays to each unit of textures."""
+@on_enter
+@on_leave
+def _let_go() -> None:
+    """Draw programs and images that stay until all are released. OpenGL's contexts hold the program that they drew last
+    until they draw another: freed meanwhile elsewhere it would end here, in a context that may not free it (see
+    library.py). They hold what is bound to units of textures and images, too. A new texture has the name of one that
+    was freed, and neither Blender nor Mesa binds one where that name is bound already: the old one, which another
+    context freed, would be read in its place."""
+    if gpu.platform.backend_type_get() != "OPENGL":
+        return
     if not _last:
         _last.extend(Shader(program) for program in LAST_DRAWN)
         _blank.append(upload(np.zeros((1, 1, 4), np.float32)))
-    for shader in _last:
-        shader.kept.lasts = shader.kept.lasts or lasts()
-    _last[0].bind(textures=dict.fromkeys(_UNITS, _blank[0]))
-
-
-@on_enter
-def _forget_textures() -> None:
-    """Bind what stays to each unit of textures. OpenGL gives a new texture the name of one that was freed, and Blender
-    binds none whose name is bound already: where another context has freed that, it is still the old one, which
-    would be read in place of the new one."""
-    if gpu.platform.backend_type_get() == "OPENGL":
-        _bind_blanks()
-        gpu.shader.unbind()
+    units = {"textures": dict.fromkeys(_TEXTURES, _blank[0]), "images": dict.fromkeys(_IMAGES, _blank[0])}
+    with borrowed(1, 1, "RGBA32F") as target, _state(target):
+        for shader, bound in zip(_last, (units, {})):
+            shader.kept.lasts = shader.kept.lasts or lasts()
+            shader.bind(**bound)
+            _fullscreen_batch().draw(shader.handle)
+    gpu.shader.unbind()
 
 
 @on_picture
-def _forget_textures_of_renders() -> None:
+def _let_go_beside_renders() -> None:
     """The same where contexts of final renders come and go beside one that nobody enters."""
-    if _last:
-        _forget_textures()
-
-
-@on_leave
-def _let_go() -> None:
-    """Draw programs that stay until all are released, with images that stay. OpenGL's contexts hold the program that
-    they drew last until they draw another: freed meanwhile elsewhere it would end here, in a context that may not free
-    it (see library.py). They hold what is bound, too."""
-    if gpu.platform.backend_type_get() != "OPENGL":
-        return
-    with borrowed(1, 1, "RGBA32F") as target, _state(target):
-        _bind_blanks()
-        _fullscreen_batch().draw(_last[0].handle)
-        _last[1].bind()
-        _fullscreen_batch().draw(_last[1].handle)
-    gpu.shader.unbind()
+    if _last and is_only_one():
+        _let_go()
 
 
 @contextmanager
