@@ -8,7 +8,7 @@ the eye sees of that: a coarse picture in the pixels of the guide so shows whole
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -192,20 +192,22 @@ class FirstLook:
             self._glows = True
         return self._glow
 
-    def refined(self, coarse: images.Image, exposure: float, emitted: Emitted | None = None) -> images.Image:
-        """A coarse picture of what was drawn last in the pixels of that: edges and shapes of the first look, and the
-        light of the picture. What it shows of what is `emitted` is drawn in fine pixels, too."""
+    def refining(self, coarse: images.Image, exposure: float, emitted: Emitted | None = None) -> Iterator[None]:
+        """Draw `fine`: a coarse picture of what was drawn last in the pixels of that: edges and shapes of the first
+        look, and the light of the picture. What it shows of what is `emitted` is drawn in fine pixels, too. In parts,
+        one for each program."""
         size = self._target.size
         if self._fine is None or self._fine.size != size:
             self._give_fine()
             self._fine = images.Target((images.pool.take(*size, "RGBA16F"),))
-        if emitted is not None:
-            self._add(emitted.lamps)
+        if emitted is not None and self._add(emitted.lamps):
+            yield
         glows = emitted is not None and self._glows
         with images.borrowed(*coarse.size, "R32F") as shines:
             if glows:
                 finer = max(size[0] // coarse.size[0], 1)
                 passes.fullscreen(SHINES, shines, textures={"glow": self._glow}, constants={"finer": finer})
+                yield
             textures = {
                 "guide": self.guide, "look": self.picture, "coarse": coarse, "shines": shines.colors[0],
                 "glow": self._glow if glows else self.guide, "emission": emitted.image if glows else coarse,
@@ -215,14 +217,24 @@ class FirstLook:
                 "emission_scale": emitted.scale if glows else 0.0,
             }  # fmt: skip
             passes.fullscreen(FINE, self._fine, textures=textures, constants=constants)
+
+    def refined(self, coarse: images.Image, exposure: float, emitted: Emitted | None = None) -> images.Image:
+        """`fine`, at once."""
+        for _ in self.refining(coarse, exposure, emitted):
+            pass
+        return self.fine
+
+    @property
+    def fine(self) -> images.Image:
+        """What was refined last."""
         return self._fine.colors[0]
 
-    def _add(self, lamps: list[Emitter]) -> None:
-        """Add lamps in view to what emits."""
+    def _add(self, lamps: list[Emitter]) -> bool:
+        """Add lamps in view to what emits; whether there are any."""
         rows = {id(one): rows_seen(one, self._rows, self._target.size[1]) for one in lamps}
         seen = lights.traceable([one for one in lamps if rows[id(one)] is not None])
         if not seen:
-            return
+            return False
         low, high = zip(*(rows[id(one)] for one in seen))
         passes.fullscreen(
             LAMPS_SEEN, images.Target((self._begin_glow(),)), blend="ADDITIVE_PREMULT", rows=(min(low), max(high)),
@@ -232,6 +244,7 @@ class FirstLook:
                 "film_view": self._view, "sources": self._sources.set([one.row(one.centre, 0, 0) for one in seen]),
             },
         )  # fmt: skip
+        return True
 
     def fill_in(self, lit: images.Image, target: images.Target, *scene) -> None:
         """Into the target a picture that has direct light alone, with a faint light from the eye in its shadows.

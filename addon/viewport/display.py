@@ -6,7 +6,7 @@ Its picture is an image of its own, since those of a frame come and go.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from ..frame.picture import Frame
@@ -78,9 +78,9 @@ class Display:
         """Into the target what is shown of a frame that lacks indirect light, with a faint light from the eye."""
         self._guide.fill_in(shown, target, *scene, _view(frame.snapshot.camera, frame.snapshot.film, scene))
 
-    def refine(self, frame: Frame, scene: Scene, scale: int, step: float) -> None:
+    def refining(self, frame: Frame, scene: Scene, scale: int, step: float) -> Iterator[None]:
         """Show the draft that is the picture in finer pixels, if there is time for that within a step and no lens blurs
-        what it shows."""
+        what it shows. In parts, one for each program."""
         if frame.snapshot.camera.aperture is not None:
             return
         x0, y0, x1, y1 = self._shown_place[2]
@@ -88,18 +88,29 @@ class Display:
         guided = self.guides.scale(pixels, scale, step)
         if guided is None:
             return
-        started, fresh = time.perf_counter(), library.news()
+        spent, fresh = 0.0, library.news()
+        parts, going = self._guiding(frame, scene, scale // guided), True
+        while going:
+            started = time.perf_counter()
+            going = next(parts, parts) is not parts
+            if not going:
+                images.finish()
+            spent += time.perf_counter() - started
+            if going:
+                yield
+        if library.news() == fresh:
+            self.guides.learn(spent, pixels // guided**2)
+        self._refined = self._guide.fine
+
+    def _guiding(self, frame: Frame, scene: Scene, finer: int) -> Iterator[None]:
         # The rectangle of the draft's own pixels, which begins and ends with whole ones.
-        film, finer = frame.snapshot.film, scale // guided
+        film = frame.snapshot.film
         whole = replace(
             film, width=film.width * finer, height=film.height * finer, border=tuple(finer * e for e in film.border)
         )
         self._guide.draw(*scene, _view(frame.snapshot.camera, whole, scene), guides=True)
-        refined = self._guide.refined(self.picture, film.exposure, emitted_in(frame))
-        images.finish()
-        if library.news() == fresh:
-            self.guides.learn(time.perf_counter() - started, pixels // guided**2)
-        self._refined = refined
+        yield
+        yield from self._guide.refining(self.picture, film.exposure, emitted_in(frame))
 
     def look_at(self, camera: Camera, size, border, scene: Scene) -> None:
         """Show a first look, unless the picture is of this very place."""

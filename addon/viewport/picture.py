@@ -224,7 +224,7 @@ class Viewport:
                 self._unshown = [self._take, self._refine]
                 if not self._shows(frame, redraw):
                     break
-            elif frame.part_done and self.scale == 1 and self.render_pass is None:
+            elif frame.part_done and self.scale == 1 and self.render_pass is None and not redraw.is_fresh:
                 self._take(frame)
             if (self._waits or frame.samples_done or redraw.is_fresh) and redraw.is_over(spent):
                 break
@@ -269,9 +269,9 @@ class Viewport:
 
     def _resolve(self, frame: Frame) -> None:
         """Show the mean of the frame's samples at once."""
-        self._unshown = []
-        self._take(frame)
-        self._refine(frame)
+        self._unshown = [self._take, self._refine]
+        while self._unshown:
+            self._unshown.pop(0)(frame)
 
     def _take(self, frame: Frame) -> None:
         """Take the mean of the frame's samples for the picture."""
@@ -279,9 +279,15 @@ class Viewport:
         self.was_whole |= self.scale == 1
 
     def _refine(self, frame: Frame) -> None:
-        """Draw a draft in finer pixels."""
+        """Begin to draw a draft in finer pixels."""
         if self.scale > 1 and self.render_pass is None:
-            self.display.refine(frame, self._scene, self.scale, max(self.step, self._sample_seconds))
+            parts = self.display.refining(frame, self._scene, self.scale, max(self.step, self._sample_seconds))
+            self._refine_on(parts)
+
+    def _refine_on(self, parts: Iterator[None]) -> None:
+        """Go on with that: one part, before anything else is drawn."""
+        if next(parts, parts) is not parts:
+            self._unshown.insert(0, lambda _: self._refine_on(parts))
 
     def _put(self, frame: Frame, target: images.Target) -> None:
         """Draw what is shown of the frame's samples."""
@@ -480,7 +486,7 @@ class Viewport:
 
     def release(self) -> None:
         """Free everything on the GPU and all that was read of the scene; this viewport is not used again."""
-        self._beginning = None
+        self._beginning, self._unshown = None, []
         self.renderer.release()
         self.cache.clear()
         self.display.drop()

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from addon import viewport
 from addon.frame import device_probe
@@ -109,6 +110,29 @@ def test_only_programs_in_view_have_first_draws_and_each_has_one(scene, monkeypa
     region.rest()
     assert 1 <= len(drawn) <= 2 and not set().union(*drawn) & {"Magic", "Checker"}
     region.viewport.release()
+
+
+def test_shapes_of_a_draft_come_in_by_one_program_a_redraw(scene, cold, monkeypatch):
+    """Three where a lamp is in view."""
+    bpy.ops.object.light_add(type="POINT", location=scene.camera.matrix_world @ Vector((0.0, 0.0, -3.0)))
+    bpy.context.object.data.shadow_soft_size, bpy.context.object.visible_camera = 0.1, True
+    wanted, redraws, compile_one = (
+        {f"first look {name}" for name in ("lamps", "shines", "guides")},
+        [],
+        library._compile,
+    )
+
+    def noted(program):
+        redraws[-1].update({program.name} & wanted)
+        return compile_one(program)
+
+    monkeypatch.setattr(library, "_compile", noted)
+    for _ in range(200):
+        redraws.append(set())
+        cold.draw()
+        if "first look guides" in redraws[-1]:
+            break
+    assert sorted(map(sorted, filter(None, redraws))) == sorted([name] for name in wanted)
 
 
 @pytest.mark.slow
