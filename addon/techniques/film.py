@@ -26,7 +26,7 @@ from ..frame.light_paths import LIGHT_PATHS, SEEN, TOGETHER
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Technique, Write
-from ..gfx import images, passes
+from ..gfx import images, library, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..lighting import repeated_light
@@ -198,7 +198,10 @@ class Film(Technique):
         asked, count = count_of(points, frame.settings.samples), film_points.points_of_sample(frame, points)
         with _borrowed(frame, len(self._held)) as collected:
             light = {path: frame.images[f"radiance.{path}"] for path in (*self._paths, *self._pixel_paths)}
+            known = library.news()
             self._collect(frame, surface_bindings(frame), collected, {path: light[path] for path in self._summed})
+            if library.news() != known:  # the filter has programs of its own
+                yield
             self._filter(frame, collected, light, surface_bindings(frame), frame.sample, 1.0 / count)
         shining = frame.service(MediaEmission)
         if shining is not None:
@@ -280,6 +283,7 @@ class Film(Technique):
             direct = images.Target(tuple(by_path[path] for path in own), depth) if repeated else None
             try:
                 for point in range(first, first + count - 1):
+                    known = library.news()
                     frame.look(film=point)
                     draw_sample(frame, self, target)
                     bindings = {f"surface_{name}": image for name, image in surfaces.items()}
@@ -289,6 +293,8 @@ class Film(Technique):
                         how = (paths, tuple(carriers), into, surfaces, point, False)
                         film_points.light_between(frame, *how, carried=carriers)
                     frame.count(self, "passes", 1 + len(more))
+                    if library.news() != known:  # what follows has programs of its own
+                        yield
                     if repeated:
                         repeated_light.repeat(frame, self._repeated, bindings, direct)
                         frame.count(self, "passes", len(frame.shared(repeated_light.KeptLight).passes))

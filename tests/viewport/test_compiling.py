@@ -135,6 +135,26 @@ def test_shapes_of_a_draft_come_in_by_one_program_a_redraw(scene, cold, monkeypa
     assert sorted(map(sorted, filter(None, redraws))) == sorted([name] for name in wanted)
 
 
+def test_programs_of_the_film_come_in_one_by_one(scene, monkeypatch):
+    """In a draft and in full, where light between points of the film has one more."""
+    library._shaders.clear()
+    made, compile_one = [], library._compile
+    monkeypatch.setattr(library, "_compile", lambda program: made.append(program.name) or compile_one(program))
+    region = Region()
+    settings = replace(settings_of(scene, viewport=True), samples=1)
+    renderer, snapshot = region.viewport.renderer, region.source(region.camera, *SIZE)
+    together = []
+    for drawn in (settings.as_draft(), settings):
+        frame, before = renderer.begin(snapshot, drawn), len(made)
+        for _ in renderer.steps(frame):
+            together.append([name for name in made[before:] if name.startswith("film ") and name != "film depth"])
+            before = len(made)
+    region.viewport.release()
+    first_words = {" ".join(name.split(" ")[:2]) for names in together for name in names}
+    assert first_words >= {"film collect", "film filter,", "film light"}, first_words
+    assert max(map(len, together)) == 1, together
+
+
 @pytest.mark.slow
 def test_programs_that_follow_rays_come_in_one_by_one(scene, monkeypatch):
     """They are the largest: no part of a sample compiles two, in a draft or in full, at pixels or in mirrors."""
