@@ -65,19 +65,19 @@ KEEP = passes.fullscreen_program(
 KEPT_FIELDS = ("row_x", "row_y", "row_w", "eye", "right", "up", "backward", "frame")  # of VIEW, by cell
 KEPT_VIEWS = Struct("KeptViews", *(("vec4", f"{name}[{CELLS}]") for name in KEPT_FIELDS))
 SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "surface_normal", "surface_diffuse"))
+AT_HITS = ("energy_table", "ray_direction", "met_path", "hit_passed", "kept_maps")
 
 
 @cache
 def at_hits_program(transmission: bool, soft: bool = False) -> Program:
     """`soft`: some hits have lobes without microfacets."""
-    lobes = (*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), ("RGBA32F", "ray_direction")) if soft else SEEN
     paths = ("glossy", "transmission") if transmission else ("glossy",)
     return passes.fullscreen_program(
         "caustic map at hits",
         "caustics/at_hits.frag.glsl",
-        textures=(*lobes, *(("RGBA32F", name) for name in ("met_path", "hit_passed", "kept_maps"))),
+        textures=(*SURFACE_TEXTURES, *(("RGBA32F", name) for name in AT_HITS)),
         blocks=((KEPT_VIEWS, "kept_views"),),
-        constants=(("INT", "map_count"), ("INT", "map_side")),
+        constants=(("INT", "map_count"), ("INT", "map_side"), ("FLOAT", "shaded_roughness")),
         defines=(
             ("MAP_COLUMNS", str(COLUMNS)),
             *((("TRANSMISSION", "1"),) if transmission else ()),
@@ -182,7 +182,7 @@ class CausticMaps:
             seen_from = light.middle
             extent *= max(1.0, light.emitter.reach / float(np.linalg.norm(seen_from.high - seen_from.low)))
         view = widened(seen_from, extent, corners[None] - frame.geometry.origin, side, self._shift)
-        block, seen = self._receivers.receivers(frame, technique, view, casters.materials)
+        block, seen = self._receivers.receivers(frame, technique, view, casters.refracting | set(casters.going_on))
         caught = {name: seen[name.replace("receiver", "surface")] for _, name in MAP}
         if self._map is None or self._map.size != (side, side):
             self._give_map()
@@ -267,10 +267,10 @@ def _by_cell(views: list[dict]) -> dict[str, np.ndarray]:
 
 def add_at_hits(
     frame: Frame, technique: Technique, maps: Iterable[KeptMaps], target: images.Target, transmission: bool, where: str,
-    textures: dict[str, images.Image],
+    textures: dict[str, images.Image], roughness: float,
 ) -> None:  # fmt: skip
     """Add the caustics of `maps` at hits into images of indirect light. `textures`: closures of the hits (surface_*),
-    and the paths that met them (met_path, hit_passed, ray_direction)."""
+    and the paths that met them (met_path, hit_passed, ray_direction). `roughness`: of lobes up to which rays go on."""
     program = at_hits_program(transmission, frame.materials.soft)
     textures = {**textures, "energy_table": frame.materials.energy_table}
     wanted = {name for _, name in program.textures}
@@ -284,6 +284,6 @@ def add_at_hits(
             where=where,
             textures={**bound, "kept_maps": one.image},
             blocks={"kept_views": one.block},
-            constants={"map_count": len(one.views), "map_side": one.side},
+            constants={"map_count": len(one.views), "map_side": one.side, "shaded_roughness": roughness},
         )
         frame.count(technique, "passes")

@@ -399,7 +399,7 @@ class ShadedReflections(Technique, BothWays):
                         frame, rays, records, closures, sources, len(rows), round_, transmission
                     )
                     if caustics:
-                        self._add_caustics(frame, caustics, rays, records, closures, transmission)
+                        self._add_caustics(frame, caustics, rays, records, closures, transmission, onward_roughness)
                     drawing.done(number)
                     yield
                     if number + 1 == rounds or not turns.weight(frame, number + 1):
@@ -576,12 +576,12 @@ class ShadedReflections(Technique, BothWays):
             frame.count(self, "passes")
             yield
 
-    def _add_caustics(self, frame, maps, rays, records, closures, transmission) -> None:
+    def _add_caustics(self, frame, maps, rays, records, closures, transmission, roughness) -> None:
         textures = closure_bindings(closures) | {
             "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"], "ray_direction": rays.colors[1],
         }  # fmt: skip
         target = self._target(transmission, ("indirect",), records.target.depth)
-        caustic_maps.add_at_hits(frame, self, maps, target, transmission, MET, textures)
+        caustic_maps.add_at_hits(frame, self, maps, target, transmission, MET, textures, roughness)
 
     def _target(self, transmission: bool, orders: tuple[str, ...], depth: images.Image) -> images.Target:
         return images.Target(tuple(self._into[name] for name in _names(transmission, orders)), depth)

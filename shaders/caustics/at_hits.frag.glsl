@@ -1,10 +1,16 @@
 // The caustics of lights on what rays have met: what diffuse closures there reflect of the irradiance that kept maps hold
-// for their place, and with SOFT lobes without microfacets, as if it came straight from the light. Of the four texels around
-// it those count whose surface lies on the hit's plane. The maps are cells of one image.
+// for their place, and, as if it came straight from the light, glossy lobes from which no ray goes on and with SOFT those
+// without microfacets. Of the four texels around it those count whose surface lies on the hit's plane. The maps are cells of
+// one image.
 #include "lib/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
+#include "lib/brdf.glsl"
+#ifdef TRANSMISSION
+#include "lib/refraction.glsl"
+#endif
 #include "hits/shown.glsl"
+#include "hits/onward.glsl"
 #include "caustics/least_cosine.glsl"
 #include "ask/leaving.glsl"
 #ifdef SOFT
@@ -91,14 +97,17 @@ void main()
   int code = int(path.w + 0.5);
   vec4 place = surface_position_fetch(pixel);
   vec3 albedo = surface_diffuse_fetch(pixel).rgb;
-#ifdef SOFT
   Surface s = SURFACE_READ(pixel);
-  SoftLobe soft = soft_lobe_begin(s, -ray_direction_fetch(pixel).xyz);
-  bool has_lobe = soft.exists && !soft.fibre && soft.kind != LOBE_TRANSLUCENT;
+  vec3 viewer = -ray_direction_fetch(pixel).xyz;
+  bool shines = s.kind <= FRESNEL_F82 && max_component(s.glossy_weight) > 0.0 && !lobe_goes_on(s);
+  Lobe lobe = lobe_begin(s, viewer);
+#ifdef SOFT
+  SoftLobe soft = soft_lobe_begin(s, viewer);
+  bool has_soft = soft.exists && !soft.fibre && soft.kind != LOBE_TRANSLUCENT;
 #else
-  const bool has_lobe = false;
+  const bool has_soft = false;
 #endif
-  if (code == 0 || place.w == 0.0 || (max_component(albedo) <= 0.0 && !has_lobe)) {
+  if (code == 0 || place.w == 0.0 || (max_component(albedo) <= 0.0 && !shines && !has_soft)) {
     return;
   }
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
@@ -108,12 +117,15 @@ void main()
     map_view = view_of_cell(cell);
     vec3 arriving = irradiance_at(place.xyz, normal, map_side * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
     irradiance += arriving;
-#ifdef SOFT
-    if (has_lobe && max_component(arriving) > 0.0) {
+    if ((shines || has_soft) && max_component(arriving) > 0.0) {
       vec3 to_light = safe_normalize(way_to_light(place.xyz));
-      by_lobe += arriving * soft_reflection(soft, to_light) / max(dot(normal, to_light), LEAST_COSINE);
-    }
+      float density;
+      vec3 reflected = shines ? lobe_reflection(lobe, to_light, density) : vec3(0.0);
+#ifdef SOFT
+      reflected += has_soft ? soft_reflection(soft, to_light) : vec3(0.0);
 #endif
+      by_lobe += arriving * reflected / max(dot(normal, to_light), LEAST_COSINE);
+    }
   }
   // Light that enters surfaces elsewhere is known from their points, to which it comes straight.
   vec3 sent;

@@ -882,6 +882,25 @@ def test_a_lobe_shows_a_lamp_through_glass_that_bends_nothing_as_without_it(stag
     assert through[10:14, 10:14].mean() == pytest.approx(free[10:14, 10:14].mean(), rel=0.06)
 
 
+@pytest.mark.parametrize("roughness", [THROWS, 0.5])
+def test_rough_metal_is_lit_through_glass_that_it_is_seen_through(stage, roughness):
+    """A ball that bends nothing leaves metal below it as bright as without it, and metal that throws caustics itself
+    receives them, too. (From lobes as rough as these no ray goes on where they are met: the dial of a watch below its
+    domed crystal was black under a lamp.)"""
+    metal = stage.material("ShaderNodeBsdfGlossy", Roughness=roughness, Color=(1, 1, 1, 1))
+    stage.rectangle((-1.5, -1.5), (1.5, 1.5), material=metal)
+    made = ball(stage, glass(stage, 1.0), place=(0, 0, 1.0), segments=48)
+    made.visible_camera = True
+    stage.light("SPOT", location=(0.5, 0, 2.5), turn=(0, 0.2, 0), shadow_soft_size=0.1, spot_size=1.0, spot_blend=0.0)
+    stage.camera_above(0.4)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "instant_radiosity", PHOTONS
+    found = []
+    for hidden in (False, True):
+        made.hide_render = hidden
+        found.append(stage.render(samples=4, size=(24, 24), bounces=3)["combined"][4:20, 4:20, 0].mean())
+    assert found[0] == pytest.approx(found[1], rel=0.08)
+
+
 def test_a_light_guide_of_glass_loses_nothing_at_its_walls(stage):
     """A beam that enters the end of a rod at 65 degrees: twelve total reflections in one bring as much to the floor as
     three in another."""
