@@ -219,12 +219,13 @@ class Viewport:
         and scene may wait for its next sample, but a new program is reason enough to let Blender answer."""
         spent = 0.0
         while frame.samples_done < settings.samples:
+            known = library.news()
             spent = self._work(frame, redraw.clock, redraw.budget)
             if self._sample is None:  # shown now: the next sample, once it has begun, changes the images that are shown
                 self._unshown = [self._take, self._refine]
                 if not self._shows(frame, redraw):
                     break
-            elif frame.part_done and self.scale == 1 and self.render_pass is None and not redraw.is_fresh:
+            elif frame.part_done and self.scale == 1 and self.render_pass is None and library.news() == known:
                 self._take(frame)
             if (self._waits or frame.samples_done or redraw.is_fresh) and redraw.is_over(spent):
                 break
