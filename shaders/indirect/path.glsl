@@ -233,8 +233,9 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
     smooth_normal = (dot(smooth_normal, met.normal) < 0.0) ? -smooth_normal : smooth_normal;
     met.mirror_normal = (dot(smooth_normal, direction) < 0.0) ? smooth_normal : met.normal;
 #ifdef GLASS_MIRRORS
-    // Glass stops rays with the chance that Fresnel's reflectance has in the mean over even light, and mirrors those by
-    // that at their angle over the mean. Beside other closures no mirror is known apart.
+    // Glass stops rays with the chance of about Fresnel's reflectance at their angle (stopped_by_angle), that with a tile of
+    // its mean over even light, and mirrors those by that reflectance over the chance. Beside other closures no mirror is
+    // known apart.
     float ior = reflectance_fetch(place + ivec2(0, 6 * reflectance_rows())).a;
     for (bool glass = triangle_is_glass(hit); glass; glass = false) {
       if (ior <= 0.0 || max_component(met.reflection.diffuse) > 0.0) {
@@ -242,17 +243,19 @@ void mirror_met(inout Vertex met, ivec2 hit, vec3 direction)
         break;
       }
       ior = max(ior, 1.0 / ior);
-      float mean = fresnel_average_dielectric(ior);
       float cosine = -dot(met.mirror_normal, direction);
+      float mean = fresnel_average_dielectric(ior);
+      float even = mean;
+      float stopped = glass_stops(hit, abs(dot(met.normal, direction)), even);
       // The material's means are over the chance that it has at their view.
-      float less = fresnel_dielectric(0.577, ior) / mean;
-      met.reflection.straight *= less;
-      met.reflection.grazing *= less;
+      float at_view = fresnel_dielectric(MEAN_COSINE, ior);
+      float chance = 1.0 - (1.0 - even) * (1.0 - at_view) / (1.0 - mean);
+      float mirrored = fresnel_dielectric(cosine, ior) / max(stopped, 1e-6) * chance / max(at_view, 1e-6);
       vec3 albedo = reflectance_fetch(ivec2(material & 15, material >> 4)).rgb;
-      vec3 lobe = mix(met.reflection.straight, met.reflection.grazing, pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0));
-      met.mirror_share = albedo * (fresnel_dielectric(cosine, ior) / mean) / max(lobe, vec3(1e-6));
-      // At grazing angles few rays would bring much each: the lobe sends what is more than MOST_MIRRORED of even light.
-      met.by_rays = min(MOST_MIRRORED * mean / max(fresnel_dielectric(cosine, ior), 1e-6), 1.0);
+      met.reflection.straight = met.reflection.grazing = albedo * mirrored;
+      met.mirror_share = vec3(1.0);
+      // Where few rays would bring much each the lobe sends what is more than MOST_MIRRORED of even light.
+      met.by_rays = min(MOST_MIRRORED / max(mirrored, 1e-6), 1.0);
     }
 #endif
   }

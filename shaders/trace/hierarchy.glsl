@@ -204,6 +204,34 @@ vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction,
   return shadow ? mix(opacity, vec4(1.0), last * (vec4(1.0) - glass)) : opacity;
 }
 
+#ifndef OPAQUE_ONLY
+// Share of rays that glass stops at these cosines, which is what it mirrors of them: Schlick's curve with the mean `even` over
+// even light.
+vec4 stopped_by_angle(vec4 even, vec4 cosine)
+{
+  vec4 straight = clamp((21.0 * even - vec4(1.0)) / 20.0, vec4(0.0), vec4(1.0));
+  vec4 left = vec4(1.0) - min(cosine, vec4(1.0));
+  vec4 squared = left * left;
+  return straight + min(21.0 * even, vec4(1.0)) * (vec4(1.0) - straight) * squared * squared * left;
+}
+
+// The same share by angle of those of four triangles that are glass, no sheet, and have no tile.
+vec4 glass_by_angle(int leaf, Four f, vec4 facing, vec3 direction, vec4 opacity)
+{
+  vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
+  vec4 glass = vec4(lessThan(code, vec4(0.0))) * vec4(greaterThan(code, vec4(-3.0 * SIDES * SIDES)));
+  glass *= vec4(greaterThanEqual(opacity, vec4(0.0)));
+  if (dot(glass, vec4(1.0)) == 0.0) {
+    return opacity;
+  }
+  vec4 x = f.e1y * f.e2z - f.e1z * f.e2y;
+  vec4 y = f.e1z * f.e2x - f.e1x * f.e2z;
+  vec4 z = f.e1x * f.e2y - f.e1y * f.e2x;
+  vec4 cosine = abs(facing) * inversesqrt(max((x * x + y * y + z * z) * dot(direction, direction), vec4(1e-36)));
+  return mix(opacity, stopped_by_angle(opacity, cosine), glass);
+}
+#endif
+
 // A place in the tree: a node, or a leaf.
 struct Place {
   int index;
@@ -424,12 +452,15 @@ void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool
               inout ivec2 hit)
 {
   vec4 facing;
-  vec4 t = intersect_four(four_read(leaf), origin, direction, facing);
+  Four four = four_read(leaf);
+  vec4 t = intersect_four(four, origin, direction, facing);
   float best = min(min(t.x, t.y), min(t.z, t.w));
   if (best < nearest) {
     vec4 opacity = opacity_of_four(leaf, t, nearest, origin, direction, facing, bent, shadow);
 #ifdef OPAQUE_ONLY
     opacity = floor(opacity);
+#else
+    opacity = (bent || shadow) ? opacity : glass_by_angle(leaf, four, facing, direction, opacity);
 #endif
     uint roll = hash3(uvec3(uint(leaf), salt, 77u + uint(record))).x;
     vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
@@ -662,6 +693,21 @@ vec3 triangle_shading_normal(ivec2 hit, vec3 position)
 bool triangle_is_glass(ivec2 hit)
 {
   return leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)] < 0.0;
+}
+
+// The share of rays of paths that a triangle of glass, no sheet, stops at this cosine. `even`: that of even light; it is both
+// where the triangle has a tile, and then stays.
+float glass_stops(ivec2 hit, float cosine, inout float even)
+{
+  float share = even;
+#ifndef OPAQUE_ONLY
+  float code = -leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)];
+  if (code < 3.0 * SIDES * SIDES) {
+    even = mod(code, SIDES) / (SIDES - 1.0);
+    share = stopped_by_angle(vec4(even), vec4(cosine)).x;
+  }
+#endif
+  return share;
 }
 
 // Whether it is glass that is no closed solid.

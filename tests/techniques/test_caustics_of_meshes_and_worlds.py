@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.materials.energy import fresnel_dielectric
 from tests.techniques.test_caustics import BALL_LENS, ball, glass, light_through_a_ball, rings, slab, within
 
 EDGES = np.array([0.0, 0.18, 0.3])
@@ -90,3 +91,24 @@ def test_a_floor_has_the_light_that_a_pane_of_the_picture_mirrors(stage):
         floor = images[0]["diffuse_color"][..., 0] > 0.99
         found.append(np.mean([one["diffuse_indirect"][..., 0][floor].mean() for one in images]))
     assert found[0] == pytest.approx(found[1], rel=0.15)
+
+
+def test_a_pane_mirrors_a_lamp_onto_the_floor_at_its_foot_as_both_faces_do(stage):
+    """The mirror image of the lamp, by 2 F / (1 + F) at each angle: 1.34 times that where each face stops as many rays
+    at all angles."""
+    stage.rectangle((-1, -1), (1, 1), material=stage.diffuse())
+    slab(stage, glass(stage), 0.0, 0.02, half=9.0).rotation_euler = (-np.pi / 2, 0, 0)
+    stage.light("AREA", (0, -1, 1.5), energy=100.0, size=2.0)
+    stage.scene.candela.slot_caustics = "OFF"
+    camera = stage.camera_above(0.05)
+    camera.location.y = -0.1
+    found = [stage.render(64, (16, 16), bounces=2, seed=seed)["diffuse_indirect"][..., 0].mean() for seed in range(2)]
+
+    k = 2.0 * (np.arange(200) + 0.5) / 200 - 1.0
+    x, y = np.meshgrid(k, 1.0 + k + 0.1)
+    distance = np.sqrt(x**2 + y**2 + 1.5**2)
+    face = fresnel_dielectric(y / distance, 1.5)
+    seen = (1.5 / distance) ** 2 / distance**2 * (2 * face / (1 + face))  # W / (m2 sr) of the lamp: 100 / (4 pi)
+    expected = 100.0 / (4.0 * np.pi) * seen.mean() * 4.0 / np.pi
+    print(f"{np.mean(found):.4f}, expected {expected:.4f}")
+    assert np.mean(found) == pytest.approx(expected, rel=0.1)
