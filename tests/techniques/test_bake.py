@@ -135,27 +135,6 @@ def test_a_mirror_that_is_baked_once_shows_what_its_places_see(stage, workshop):
     assert alike.min() > 0.02 and found() == pytest.approx(alike, rel=0.02)
 
 
-@pytest.mark.slow
-def test_a_mirror_under_a_lamp_is_baked_as_cycles_does_that_clamps_nothing(stage, workshop):
-    """With its own defaults (Clamp Indirect 10, Filter Glossy 1, four bounces of a kind for Candela's sixteen) Cycles
-    has .76 of the light that it has without."""
-    workshop.data.materials[0] = stage.principled(Base_Color=(1, 1, 1, 1), Metallic=1.0, Roughness=0.0)
-    bpy.data.objects.remove(next(one for one in stage.scene.objects if one.type == "LIGHT" and one.data.type == "SUN"))
-    stage.world((0, 0, 0))
-    cycles, limits = stage.scene.cycles, ("max_bounces", "diffuse_bounces", "glossy_bounces")
-    before = {name: getattr(cycles, name) for name in (*limits, "sample_clamp_indirect", "blur_glossy")}
-    try:
-        cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
-        for name in limits:
-            setattr(cycles, name, 16)
-        own, theirs = beside(stage, workshop, "GLOSSY", {"INDIRECT"}, samples=64)
-    finally:
-        for name, value in before.items():
-            setattr(cycles, name, value)
-    print(f"{own.mean():.5f} of {theirs.mean():.5f}")
-    assert own.mean() == pytest.approx(theirs.mean(), rel=0.15)
-
-
 def test_vertices_may_be_the_target(stage):
     """A floor in the light of a sun that stands upright: its colour times 1 / pi at each corner."""
     floor = stage.rectangle((-1, -1), (1, 1), material=stage.diffuse(0.5))
