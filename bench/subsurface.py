@@ -291,9 +291,10 @@ def bust(method: str) -> None:
 
 
 def hair_on_skin(method: str) -> None:
-    """Strands above a ball of skin, lit from the side."""
+    """Strands above a ball of skin, lit from the side: tubes in Cycles, too, whose ribbons shade less."""
     import bpy
 
+    bpy.context.scene.cycles_curves.shape = "THICK"
     _ball(material(method, *SKIN, 1.0), (0, 0, 0), 1.0)
     k = np.arange(400)
     height, turn = 1.0 - (k + 0.5) / 400, 2.399963 * k
@@ -360,6 +361,7 @@ THROUGH: dict[str, Callable[[str], None]] = {
 def clear() -> None:
     import bpy
 
+    bpy.context.scene.cycles_curves.shape = "RIBBONS"
     bpy.data.batch_remove([*bpy.data.objects, *bpy.data.meshes, *bpy.data.lights, *bpy.data.cameras])
     bpy.data.batch_remove([*bpy.data.materials, *bpy.data.worlds, *bpy.data.hair_curves, *bpy.data.collections])
 

@@ -39,6 +39,11 @@ LIGHTING_WITH_WAYS = replace(
     LIGHTING, name="light of points and its ways", defines=(*LIGHTING.defines, ("WAYS", "1")),
     outputs=(*OUTPUTS, ("VEC4", "out_ways")),
 )  # fmt: skip
+# Of light in directions about the points' normals alone.
+LIGHTING_IN_LOBES = replace(
+    LIGHTING, name="light of points in lobes", defines=(*LIGHTING.defines, ("IN_LOBES", "1")),
+    constants=(*LIGHTING.constants, ("FLOAT", "lobe_power")),
+)  # fmt: skip
 
 
 class PointLight:
@@ -72,13 +77,16 @@ class PointLight:
     def add(
         self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target, number: int | None = None,
         instances: images.Image | None = None, without: frozenset[int] = frozenset(), photons: bool = False,
+        lobe: float = 0.0,
     ) -> tuple[int, int]:  # fmt: skip
         """Add this sample's diffuse and glossy direct light, or that of sample `number`, on `surfaces` (by the names of
         SURFACE_IMAGES) to the two images of `target`. Of three, the second one gets what falls across its direction and
         the third where mirrors would send it, by luminance. `instances`: of which instance each point is (z: its row in
         the geometry's image), for lights that leave out objects. `without`: ids of lamps that are left out.
         `photons`: what glass passes of light that photons answer for arrives with these; of a target of three, w of the
-        second says how much is of such light. Returns the numbers of passes and of rays a point."""
+        second says how much is of such light. `lobe`: above 0 light counts
+        by that power of the cosine, normalized, as at the normal. Returns the numbers of passes and of
+        rays a point."""
         number = frame.sample if number is None else number
         by_blockers: dict[frozenset[int], list[np.ndarray]] = {}  # that let light pass
         for passing, row in (*self._lamps(frame, number, without, photons), *self._emitted(frame, number, photons)):
@@ -86,8 +94,10 @@ class PointLight:
         by_blockers[frozenset()] = by_blockers.get(frozenset(), []) + list(self._world(frame, number, photons))
         rows = [row for some in by_blockers.values() for row in some]
         drawn = 0
+        in_lobes = {"lobe_power": lobe} if lobe else {}
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
-        program = asked(frame, LIGHTING if len(target.colors) == 2 else LIGHTING_WITH_WAYS, bound)
+        with_ways = len(target.colors) > 2
+        program = asked(frame, LIGHTING_IN_LOBES if lobe else LIGHTING_WITH_WAYS if with_ways else LIGHTING, bound)
         with ExitStack() as stack:
             if instances is not None and linked.has_links(rows):
                 groups = stack.enter_context(images.borrowed(instances.width, instances.height, "R32F"))
@@ -102,7 +112,7 @@ class PointLight:
                         program, target, blend="ADDITIVE_PREMULT",
                         textures={**bound, **textures, "energy_table": frame.materials.energy_table},
                         blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
-                        constants={"light_count": len(some), "traced_roughness": -1.0, **constants},
+                        constants={"light_count": len(some), "traced_roughness": -1.0, **constants, **in_lobes},
                     )  # fmt: skip
                     drawn += 1
         return drawn, len(rows)

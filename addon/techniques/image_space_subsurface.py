@@ -19,8 +19,8 @@ angle of view (Chandrasekhar).
 
 | cost | per sample |
 |---|---|
-| passes | 1 of the draws that scatter, 1 to 4 over the points, 5 more in glass, 2 over the picture, 2 more for walks |
-| rays | a point: one per lamp point, `world directions` and `emissive points`; 4 for indirect light |
+| passes | 1 of the draws that scatter, 1 to 4 over the points, 7 more in glass, 2 over the picture, 2 more for walks |
+| rays | a point: one per lamp point, `world directions` and `emissive points`; 4 for indirect light; EXITS in glass |
 | fetches, bytes per pixel | 5 per tap, 3 per point within reach, 1 per row; 32, and 208 while it runs; 400 a point |
 
 Bias: distances are straight lines through what may be air; the mean over taps is a ratio of what is on screen; the
@@ -32,6 +32,7 @@ object with more detail than `points` smooths that detail away.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -45,7 +46,7 @@ from ..kernels import diffusion
 from ..lighting import leaving_light, repeated_light, splatted_light, walked_light
 from ..lighting.asked import asked
 from ..lighting.leaving_light import LeavingLight, LeavingService
-from ..lighting.point_light import LIGHTING, LIGHTING_WITH_WAYS, PointLight
+from ..lighting.point_light import LIGHTING, LIGHTING_IN_LOBES, LIGHTING_WITH_WAYS, PointLight
 from ..lighting.splatted_light import Splats
 from ..lighting.visibility import RAYS, ray_bindings
 from ..materials import translucency
@@ -134,12 +135,32 @@ COAT = passes.fullscreen_program(
     constants=(("FLOAT", "offset_size"), ("INT", "bounces"), ("INT", "first_object"), ("INT", "first_leaf")),
     outputs=tuple(("VEC4", f"out_{name}") for name in ("coat", "bent", "again", "landed")),
 )  # fmt: skip
+EXIT = passes.fullscreen_program(
+    "where rays leave glass",
+    "subsurface/exit.frag.glsl",
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES,
+        *POINT_TEXTURES,
+        ("RG32F", "trace_owners"),
+        *(("RGBA32F", name) for name in (
+            "point_instances", "scatter_near", "glass_indices", "cell_coat", "cell_bent",
+        )),
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "offset_size"), ("INT", "first_leaf"), ("INT", "exits")),
+    outputs=tuple(("VEC4", f"out_{name}") for name in ("position", "normal", "entry", "instance")),
+)  # fmt: skip
 ENTER = passes.fullscreen_program(
     "light that enters in glass",
     "subsurface/enter.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in ("cell_direct", "cell_across", "cell_bent", "point_entry")),
+    textures=tuple(
+        ("RGBA32F", name) for name in ("cell_direct", "cell_across", "cell_around", "cell_bent", "point_entry")
+    ),
+    constants=(("INT", "exits"), ("INT", "samples")),
     outputs=(("VEC4", "out_direct"),),
 )
+EXITS = 16  # rays of a point in a sample that may leave its glass
+LOBE = 64.0  # power of the cosine about these that light counts by, in the first sample; in sample n by its root more
 ECHOES = 4  # times that light which glass mirrors back is followed to where it enters
 ECHO = passes.fullscreen_program(
     "light that glass mirrors back",
@@ -227,6 +248,11 @@ class ImageSpaceSubsurface(Technique):
         # Of cells, where anything is glass: by how much more light enters, how by the cosine at which it arrives, how
         # much of what leaves comes back, and from which cells.
         self._coats: tuple[images.Image, ...] = ()
+        self._indices: images.Image | None = (
+            None  # of refraction, by material; and by instance whether glass may be around
+        )
+        self._around: images.Target | None = None  # light by way of glass, added up over this many samples of a picture
+        self._arounds = 0
         self._coated: set[int] = set()  # materials of what glass may be around
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
@@ -243,7 +269,7 @@ class ImageSpaceSubsurface(Technique):
         form = (
             splatted_light.PROGRAMS if self._splatted(settings, snapshot) else (GATHER, APPLY, *walked_light.PROGRAMS)
         )
-        in_glass = (COAT, ENTER, ECHO, LIGHTING_WITH_WAYS)
+        in_glass = (COAT, EXIT, ENTER, ECHO, LIGHTING_WITH_WAYS, LIGHTING_IN_LOBES)
         return CHORD, *in_glass, LIGHTING, *form, *leaving_light.PROGRAMS
 
     def _splatted(self, settings: Settings, snapshot: Snapshot) -> bool:
@@ -286,6 +312,7 @@ class ImageSpaceSubsurface(Technique):
         if self._lobes is None:
             self._lobes = images.upload(diffusion.table())
         self._give_whole()
+        self._give_around()
         self._light.begin(frame)
         if self._splatted(frame.settings, frame.snapshot):
             self._splats.begin(frame, self.points, self._materials, frame.settings.get(self, "grid"))
@@ -364,6 +391,7 @@ class ImageSpaceSubsurface(Technique):
         listed = np.zeros((max(len(indices), len(placed)), 4), np.float32)
         listed[: len(indices), 0], listed[rows, 1] = indices, 1.0
         self._coats = tuple(images.pool.take(ROW, self.points.rows, "RGBA32F") for _ in COAT.outputs)
+        self._indices = images.upload_list(listed)
         position, normal = self.points.surface(0)
         owners, first_leaf = frame.kept(Hits).owners(frame, frame.hierarchy("shadow"))
         passes.fullscreen(
@@ -372,7 +400,7 @@ class ImageSpaceSubsurface(Technique):
                 **frame.hierarchy("shadow").textures, "trace_owners": owners, "scatter_objects": self.points.table,
                 "scatter_near": self.points.near, "point_position": position, "point_normal": normal,
                 "point_instances": self.points.instances, "scatter_means": frame.kept(ScatterMeans).image,
-                "glass_indices": images.upload_list(listed),
+                "glass_indices": self._indices,
             },
             blocks={"film_view": frame.view_block},
             constants={
@@ -402,19 +430,19 @@ class ImageSpaceSubsurface(Technique):
         position, normal = self.points.surface(frame.sample)
         target = images.Target((direct, *others))
         target.clear()
-        black = self._constant_images(size)[1]
         tint = self.points.entries(frame.sample)
-        surfaces = {"position": position, "normal": normal, "diffuse": tint, "tint": black, "lobe": black}
-        surfaces |= {"emission": black}
-        drawn, rays = self._light.add(frame, surfaces, target, instances=self.points.instances)
+        drawn, rays = self._light_on(frame, position, normal, tint, target, self.points.instances)
         frame.count(self, "passes", drawn)
         if self._coats:
             _, bent, again, landed = self._coats
+            rays += self._light_by_way_of_glass(frame, position, normal, tint)
             passes.fullscreen(
                 ENTER, images.Target((others[-1],)),
                 textures={
-                    "cell_direct": direct, "cell_across": others[0], "cell_bent": bent, "point_entry": tint,
+                    "cell_direct": direct, "cell_across": others[0], "cell_around": self._around.colors[0],
+                    "cell_bent": bent, "point_entry": tint,
                 },
+                constants={"exits": EXITS, "samples": self._arounds},
             )  # fmt: skip
             entering, pair = others[-1], (direct, others[0])
             entered, echoes = entering, min(ECHOES, frame.settings.bounces)
@@ -434,6 +462,48 @@ class ImageSpaceSubsurface(Technique):
         frame.count(self, "rays", rays * ROW * self.points.rows)
         self._direct = frame.sample, direct
         return direct
+
+    def _light_on(
+        self, frame: Frame, position, normal, tint, target: images.Target, instances: images.Image,
+        lobe: float = 0.0,
+    ) -> tuple[int, int]:  # fmt: skip
+        """Add direct light of this sample on such points; numbers of passes and of rays a point."""
+        black = self._constant_images(position.size)[1]
+        surfaces = {"position": position, "normal": normal, "diffuse": tint}
+        surfaces |= dict.fromkeys(("tint", "lobe", "emission"), black)
+        return self._light.add(frame, surfaces, target, instances=instances, lobe=lobe)
+
+    def _light_by_way_of_glass(self, frame: Frame, position, normal, tint) -> int:
+        """Add to `_around` what sources send to where rays leave glass, EXITS of each point; returns rays a point. Few
+        of these see a lamp, and walks see what has come so far."""
+        size = position.width, EXITS * position.height
+        if self._around is None:
+            self._around = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
+            self._around.clear()
+            self._arounds = 0
+        self._arounds += 1
+        owners, first_leaf = frame.kept(Hits).owners(frame, frame.hierarchy("shadow"))
+        with ExitStack() as stack:
+            found = [stack.enter_context(images.borrowed(*size, "RGBA32F")).colors[0] for _ in EXIT.outputs]
+            passes.fullscreen(
+                EXIT, images.Target(tuple(found)),
+                textures={
+                    **frame.hierarchy("shadow").textures, "trace_owners": owners, "point_position": position,
+                    "point_normal": normal, "point_entry": tint, "point_instances": self.points.instances,
+                    "scatter_near": self.points.near, "glass_indices": self._indices, "cell_coat": self._coats[0],
+                    "cell_bent": self._coats[1],
+                },
+                blocks={"film_view": frame.view_block},
+                constants={"offset_size": frame.offset_size, "first_leaf": first_leaf, "exits": EXITS},
+            )  # fmt: skip
+            drawn, rays = self._light_on(frame, *found[:3], self._around, found[3], LOBE * self._arounds**0.5)
+        frame.count(self, "passes", 1 + drawn)
+        return EXITS * rays
+
+    def _give_around(self) -> None:
+        for image in () if self._around is None else self._around.colors:
+            images.pool.give(image)
+        self._around = None
 
     def _leaving_image(self, frame: Frame) -> images.Image | None:
         """What leaves the points' surfaces in this sample, for others; None where nothing is drawn."""
@@ -559,6 +629,7 @@ class ImageSpaceSubsurface(Technique):
         self._light.release()
         self._splats.release()
         self._give_whole()
+        self._give_around()
         self._give_white()
         self._give_shapes()
         self._leaving.release()

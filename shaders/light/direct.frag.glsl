@@ -10,6 +10,8 @@
 // sum of where mirrors would send it, by luminance (lighting/lit_points.py). w of out_glossy: of light that photons answer for
 // where mirrors throw it (LIGHT_GLASS_BLOCKS, which is no matter for what glass passes here).
 //
+// IN_LOBES: diffuse surfaces reflect by the power `lobe_power` of the cosine, all together as much as by the cosine.
+//
 // KNOWN_IRRADIANCE: the lights are directions of the world, whose irradiance is known where nothing is in the way
 // (lib/known_irradiance.glsl); what arrived of the light that was drawn, and that, are left in w, for light/openness.
 #include "ask/view.glsl"
@@ -31,6 +33,10 @@
 
 vec3 diffuse_reflection(Surface s, GrassSeen grass, vec3 to_viewer, vec3 direction)
 {
+#ifdef IN_LOBES
+  float about = 0.5 * (lobe_power + 1.0) * pow(max(dot(s.normal, direction), 0.0), lobe_power);
+  return (about > 0.02) ? s.diffuse * about / PI : vec3(0.0);
+#endif
   return grass.exists ? grass_reflection(grass, s, direction) : surface_diffuse_reflection(s, to_viewer, direction);
 }
 

@@ -6,9 +6,11 @@
 //
 //   leaves / (1 - F) * sum over bounces k of (albedo back)^k;     of a flat layer leaves = (1 - F) / n2, back = 1 - leaves
 //
-// Bent glass brings light of a lamp elsewhere than a straight ray, some from below the point's horizon. So of light straight from
+// Bent glass brings light of a lamp elsewhere than a straight ray. So of light straight from
 // sources, which arrives at the cosine c to the point's normal, enters (a + b c) in place of c; a and b are those with which the
-// directions in which the rays leave have the mean and the mean cosine that they have (out_bent, without the sum over bounces).
+// directions in which rays leave have the mean and the mean cosine that they have (out_bent.xy, without the sum over bounces). These
+// are of rays that leave by the first face, above the point's horizon; others see sources where they leave (exit.frag.glsl), for
+// which out_bent.z is the number of rays over those that are not lost.
 // What the glass mirrors back of it comes from where it left: out_landed has the cells of four of the rays, drawn by what each
 // brings, out_again what of the light there enters here (echo.frag.glsl).
 //
@@ -23,18 +25,18 @@
 #include "subsurface/objects.glsl"
 
 #define WAYS 64
-#define FACES 12  // that a ray is mirrored by
 
-// Index of refraction of a material that is clear glass and nothing else; 0 of others, and of a single sheet: of light below
-// that its own code lets pass what comes in.
-float glass_index(ivec2 hit)
-{
-  if (triangle_is_sheet(hit)) {
-    return 0.0;
-  }
-  int material = triangle_material(hit);
-  return glass_indices_fetch(ivec2(material & 2047, material >> 11)).x;
-}
+vec3 point_face;
+float point_instance;
+float within;
+float glass;  // its index of refraction
+float leaves;
+float straight;  // of that, along straight rays from above the horizon, and
+float ahead;     // by the cosine between their direction outside and the normal
+float back;
+float landing;  // of that, on points of the instance
+vec4 landed;
+uvec3 ray_roll;
 
 // The cell of the instance where a ray has met it; -1 of other instances.
 int cell_met(ivec2 hit, vec3 met, vec3 direction, float instance)
@@ -49,57 +51,47 @@ int cell_met(ivec2 hit, vec3 met, vec3 direction, float instance)
          ? -1 : cell_near(met, behind ? -normal : normal, object_texel(listed + 1), object_texel(listed + 2));
 }
 
+void ray_leaves(float share, vec3 place, vec3 outwards, vec3 direction, float index, int faces)
+{
+  within += (faces == 0) ? 1.0 : 0.0;
+  glass = index;
+  leaves += share;
+  float cosine = dot(direction, point_face);
+  if (faces == 0 && cosine > 0.0) {
+    straight += share;
+    ahead += share * cosine;
+  }
+}
+
+void ray_stays(float share, ivec2 hit, vec3 met, vec3 direction, int faces)
+{
+  int cell = (hit.x >= 0 && faces > 0) ? cell_met(hit, met, direction, point_instance) : -1;
+  back += (faces > 0) ? share : 0.0;
+  if (cell >= 0) {
+    landing += share;
+    vec4 drawn = vec4(to_unit(ray_roll.x), to_unit(ray_roll.y), to_unit(ray_roll.z), to_unit(hash3(ray_roll).x));
+    landed = mix(landed, vec4(float(cell)), vec4(lessThan(drawn * landing, vec4(share))));
+  }
+}
+
+#include "subsurface/in_glass.glsl"
+
 void main()
 {
   ivec2 texel = ivec2(gl_FragCoord.xy);
   vec4 place = point_position_fetch(texel);
-  vec3 face = octahedral_decode(point_normal_fetch(texel).zw);
+  point_face = octahedral_decode(point_normal_fetch(texel).zw);
   uvec3 roll = hash3(uvec3(uvec2(texel), 7u));
-  float within = 0.0;
-  float index = 1.0;
-  float leaves = 0.0;
-  float ahead = 0.0;  // of that, by the cosine between the direction outside and the normal
-  float back = 0.0;
-  float landing = 0.0;  // of that, on points of the instance
-  vec4 landed = vec4(float(texel.y * ROW + texel.x));
+  within = leaves = straight = ahead = back = landing = 0.0;
+  glass = 1.0;
+  landed = vec4(float(texel.y * ROW + texel.x));
   int instance = int(point_instances_fetch(texel).z + 0.5);
+  point_instance = float(instance);
   bool may_be_within = place.w > 0.0 && glass_indices_fetch(ivec2(instance & 2047, instance >> 11)).y > 0.0;
   for (int k = 0; k < WAYS && may_be_within; k++) {
     vec2 u = fract(vec2(to_unit(roll.x), to_unit(roll.y)) + vec2(float(k) / float(WAYS), to_unit(reverse_bits(uint(k)))));
-    vec3 direction = cosine_direction(face, u);
-    vec3 origin = ray_origin(place.xyz, face);
-    float left = 1.0;
-    for (int faces = 0; faces < FACES; faces++) {
-      ivec2 hit;
-      float t = trace_layers(origin, direction, 1e29, 0.0, roll.z + uint(k), true, false, hit);
-      vec3 met = origin + t * direction;
-      float n = (hit.x >= 0) ? glass_index(hit) : 0.0;
-      vec3 normal = (hit.x >= 0) ? triangle_shading_normal(hit, met) : direction;
-      float cosine = dot(normal, direction);
-      if (n <= 0.0 || cosine <= 0.0) {
-        // What stands in the glass; or the glass is not around the point.
-        int cell = (hit.x >= 0 && faces > 0) ? cell_met(hit, met, direction, float(instance)) : -1;
-        back += (faces > 0) ? left : 0.0;
-        if (cell >= 0) {
-          landing += left;
-          uvec3 draw = hash3(roll + uvec3(uint(k), 1u, 2u));
-          vec4 drawn = vec4(to_unit(draw.x), to_unit(draw.y), to_unit(draw.z), to_unit(hash3(draw).x));
-          landed = mix(landed, vec4(float(cell)), vec4(lessThan(drawn * landing, vec4(left))));
-        }
-        break;
-      }
-      within += (faces == 0) ? 1.0 : 0.0;
-      index = n;
-      float mirrored = fresnel_dielectric(cosine, 1.0 / n);
-      leaves += left * (1.0 - mirrored);
-      ahead += left * (1.0 - mirrored) * max(dot(refract(direction, -normal, n), face), 0.0);
-      left *= mirrored;
-      direction = safe_normalize(direction - 2.0 * cosine * normal);
-      origin = met - ray_offset(met) * normal;
-      if (left < 1e-3) {
-        break;
-      }
-    }
+    ray_roll = hash3(roll + uvec3(uint(k), 1u, 2u));
+    follow_in_glass(ray_origin(place.xyz, point_face), cosine_direction(point_face, u), roll.z + uint(k));
   }
   out_coat = vec4(1.0, 1.0, 1.0, 0.0);
   out_bent = vec4(0.0, 1.0, 0.0, 0.0);
@@ -110,16 +102,16 @@ void main()
     vec3 color = scatter_means_fetch(ivec2(material & 15, (material >> 4) + scatter_means_size().y / 3)).rgb;
     float whole = max(leaves + back, 1e-6);
     // Of even light a face from outside (Kulla and Conty 2017).
-    float passes = 1.0 - fresnel_average_dielectric(index);
+    float passes = 1.0 - fresnel_average_dielectric(glass);
     float returned = min(back / whole, 0.99);
     vec3 again = clamp(color, vec3(0.0), vec3(1.0)) * returned;
-    float once = leaves / (whole * passes);
-    out_coat = vec4(once * echoes(again, bounces), 1.0);
+    out_coat = vec4(leaves / (whole * passes) * echoes(again, bounces), 1.0);
     out_again.rgb = again;
     // Rays to sources pass a face as half of a pane (pane_passing of materials/energy.py).
-    float face_reflects = fresnel_dielectric(sqrt(0.5), index);
+    float face_reflects = fresnel_dielectric(sqrt(0.5), glass);
     float of_lamps = sqrt((1.0 - face_reflects) / (1.0 + face_reflects));
-    float slope = 6.0 * (ahead / max(leaves, 1e-6) - 0.5);
-    out_bent.xy = once * passes / of_lamps * vec2(0.5 * (1.0 - slope), slope);
+    float slope = 6.0 * (ahead / max(straight, 1e-6) - 0.5);
+    out_bent.xy = straight / (whole * of_lamps) * vec2(0.5 * (1.0 - slope), slope);
+    out_bent.z = float(WAYS) / whole;
   }
 }

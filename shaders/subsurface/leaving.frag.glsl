@@ -92,7 +92,7 @@ void main()
   mat3 aslant = mat3(0.0);
   float squares = 0.0;
   for (int walk = 0; walk < walks; walk++) {
-    Even even = even_of(texel, first_walk + walk, 241);
+    Even even = even_alone(texel, first_walk + walk, 241);
     uvec2 salt = hash3(even.more).xy;
     vec2 v = vec2(shuffled(even.index, even.more.xy), shuffled(even.index, salt));
     vec3 view = cosine_direction(entered_normal, v);

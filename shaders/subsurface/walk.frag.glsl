@@ -92,7 +92,7 @@ void main()
   vec3 rest = vec3(0.0);
   int count = walks_of_pixel(walks, most_walks, dense_walks, width, below.free_path);
   for (int walk = 0; walk < count; walk++) {
-    Even even = even_of(pixel, film_view.sample_index * count + walk, 227);
+    Even even = even_of_pixel(pixel, film_view.sample_index * count + walk, 227);
     vec3 direction = entry_direction(normal, view, entry.x, entry.y, method == SCATTER_SKIN, even_entry(even));
     if (dot(direction, face) >= 0.0) {
       continue;

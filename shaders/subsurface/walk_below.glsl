@@ -23,8 +23,7 @@ Below below_of(float instance, vec3 color, vec3 length_m)
   return below;
 }
 
-// First numbers of walks. Those of a block of four by four texels share a sequence, so that their mean is as even as that of
-// one texel's walks.
+// First numbers of walks.
 struct Even {
   int index;
   uvec2 entry1;  // salts
@@ -35,12 +34,11 @@ struct Even {
   uvec3 more;
 };
 
-// `number`: of the walk, among all of this texel's.
-Even even_of(ivec2 texel, int number, int stream)
+// Walk number `index` of a sequence.
+Even even_in(int index, uvec3 salt)
 {
   Even even;
-  even.index = number * 16 + (texel.x & 3) + 4 * (texel.y & 3);
-  uvec3 salt = roll_of(texel >> 2, 0, film_view.seed, stream);
+  even.index = index;
   even.entry1 = salt.xy;
   salt = hash3(salt);
   even.entry2 = salt.xy;
@@ -52,6 +50,19 @@ Even even_of(ivec2 texel, int number, int stream)
   even.azimuth = salt.xy;
   even.more = hash3(salt);
   return even;
+}
+
+// `number`: of the walk, among all of this texel's.
+Even even_alone(ivec2 texel, int number, int stream)
+{
+  return even_in(number, roll_of(texel, 0, film_view.seed, stream));
+}
+
+// Texels of a block of four by four share a sequence, so that their mean is as even as that of one texel's walks; one alone
+// has a sixteenth of each number's range. So neighbours in the image must be neighbours in space.
+Even even_of_pixel(ivec2 pixel, int number, int stream)
+{
+  return even_in(number * 16 + (pixel.x & 3) + 4 * (pixel.y & 3), roll_of(pixel >> 2, 0, film_view.seed, stream));
 }
 
 vec2 even_entry(Even even)

@@ -183,8 +183,8 @@ def test_milk_that_touches_its_glass_has_the_light_that_the_glass_mirrors_back(s
     assert seen == pytest.approx(expected, rel=0.035)
 
 
-def milk_in_cylinder(stage, method):
-    """A cylinder of milk in solid glass under a sun, and a camera that sees the middle of its side."""
+def milk_in_cylinder(stage, method, turn=0.6):
+    """A cylinder of milk in solid glass under a sun, `turn` about it, and a camera that sees the middle of its side."""
     scale = 1.5 * (1.0 if method == "BURLEY" else PATH * WALK)
     milk = scattering(stage, method, scale, radius=(1, 0.9, 0.7), color=(0.95, 0.93, 0.88))
     glass = stage.principled(Base_Color=(1, 1, 1, 1), Transmission_Weight=1, Roughness=0, IOR=1.45)
@@ -194,7 +194,7 @@ def milk_in_cylinder(stage, method):
         made.data.materials.append(material)
         for polygon in made.data.polygons:
             polygon.use_smooth = len(polygon.vertices) == 4
-    stage.light("SUN", turn=(0.9, 0, 0.6), energy=np.pi, angle=0.5)
+    stage.light("SUN", turn=(0.9, 0, turn), energy=np.pi, angle=0.5)
     return stage.camera((0, -4.5, 0), (np.pi / 2, 0, 0), 0.1)
 
 
@@ -244,6 +244,18 @@ def test_lamps_light_milk_in_a_glass_cylinder_as_its_glass_bends_their_light(sta
 
     # Cycles 5.2, 4096 samples, 16 diffuse bounces, 64 of others
     assert seen == pytest.approx((0.4958, 0.4812, 0.4419), rel=0.13)
+
+
+def test_glass_leads_light_around_milk(stage):
+    """The side of milk that turns away from a sun: light from above is mirrored by the wall of the glass. It had
+    .53, .48 and .42 of Cycles' light while straight rays alone brought any."""
+    milk_in_cylinder(stage, "RANDOM_WALK", 0.6 + np.pi)
+    pictures = [shown(stage.render(8, size=(12, 9), bounces=16, seed=seed)) for seed in range(2)]
+    seen = np.mean(pictures, axis=(0, 1, 2))
+    print(f"seen {seen.round(4)}")
+
+    # Cycles 5.2, 8192 samples, 16 diffuse bounces, 64 of others
+    assert seen == pytest.approx((0.1759, 0.1673, 0.1449), rel=0.3)
 
 
 def test_what_may_be_in_glass_is_known_by_boxes(monkeypatch):
