@@ -21,7 +21,7 @@ angle of view (Chandrasekhar).
 |---|---|
 | passes | 1 of the draws that scatter, 1 to 4 over the points, 7 more in glass, 2 over the picture, 2 more for walks |
 | rays | a point: one per lamp point, `world directions` and `emissive points`; 4 for indirect light; EXITS in glass |
-| fetches, bytes per pixel | 5 per tap, 3 per point within reach, 1 per row; 32, and 208 while it runs; 400 a point |
+| fetches, bytes per pixel | 5 per tap, 3 per near point, 1 per row; 32, 208 as it runs; 400 a point (glass: 1900) |
 
 Bias: distances are straight lines through what may be air; the mean over taps is a ratio of what is on screen; the
 walk's profile is that of a plane; without virtual lights indirect light comes from pixels alone. Bumps and diffuse
@@ -156,10 +156,10 @@ ENTER = passes.fullscreen_program(
     textures=tuple(
         ("RGBA32F", name) for name in ("cell_direct", "cell_across", "cell_around", "cell_bent", "point_entry")
     ),
-    constants=(("INT", "exits"), ("INT", "samples")),
+    constants=(("INT", "blocks"), ("INT", "exits")),
     outputs=(("VEC4", "out_direct"),),
 )
-EXITS = 16  # rays of a point in a sample that may leave its glass
+EXITS, LATER_EXITS = 16, 4  # rays of a point that may leave its glass, in a picture's first sample and in others
 LOBE = 64.0  # power of the cosine about these that light counts by, in the first sample; in sample n by its root more
 ECHOES = 4  # times that light which glass mirrors back is followed to where it enters
 ECHO = passes.fullscreen_program(
@@ -251,8 +251,8 @@ class ImageSpaceSubsurface(Technique):
         self._indices: images.Image | None = (
             None  # of refraction, by material; and by instance whether glass may be around
         )
-        self._around: images.Target | None = None  # light by way of glass, added up over this many samples of a picture
-        self._arounds = 0
+        self._around: images.Target | None = None  # light by way of glass, added up over a picture
+        self._arounds = self._exits = 0  # samples, and rays of a point, that this is of
         self._coated: set[int] = set()  # materials of what glass may be around
         self._direct: tuple[int, images.Image] | None = None  # of points, with the sample
         self._leaving, self._leaving_sample = LeavingLight(), -1
@@ -442,7 +442,7 @@ class ImageSpaceSubsurface(Technique):
                     "cell_direct": direct, "cell_across": others[0], "cell_around": self._around.colors[0],
                     "cell_bent": bent, "point_entry": tint,
                 },
-                constants={"exits": EXITS, "samples": self._arounds},
+                constants={"blocks": EXITS, "exits": self._exits},
             )  # fmt: skip
             entering, pair = others[-1], (direct, others[0])
             entered, echoes = entering, min(ECHOES, frame.settings.bounces)
@@ -474,14 +474,16 @@ class ImageSpaceSubsurface(Technique):
         return self._light.add(frame, surfaces, target, instances=instances, lobe=lobe)
 
     def _light_by_way_of_glass(self, frame: Frame, position, normal, tint) -> int:
-        """Add to `_around` what sources send to where rays leave glass, EXITS of each point; returns rays a point. Few
+        """Add to `_around` what sources send to where rays of each point leave glass; returns rays a point. Few
         of these see a lamp, and walks see what has come so far."""
         size = position.width, EXITS * position.height
         if self._around is None:
             self._around = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
             self._around.clear()
-            self._arounds = 0
+            self._arounds = self._exits = 0
+        exits = LATER_EXITS if self._arounds else EXITS
         self._arounds += 1
+        self._exits += exits
         owners, first_leaf = frame.kept(Hits).owners(frame, frame.hierarchy("shadow"))
         with ExitStack() as stack:
             found = [stack.enter_context(images.borrowed(*size, "RGBA32F")).colors[0] for _ in EXIT.outputs]
@@ -494,11 +496,11 @@ class ImageSpaceSubsurface(Technique):
                     "cell_bent": self._coats[1],
                 },
                 blocks={"film_view": frame.view_block},
-                constants={"offset_size": frame.offset_size, "first_leaf": first_leaf, "exits": EXITS},
+                constants={"offset_size": frame.offset_size, "first_leaf": first_leaf, "exits": exits},
             )  # fmt: skip
             drawn, rays = self._light_on(frame, *found[:3], self._around, found[3], LOBE * self._arounds**0.5)
         frame.count(self, "passes", 1 + drawn)
-        return EXITS * rays
+        return exits * rays
 
     def _give_around(self) -> None:
         for image in () if self._around is None else self._around.colors:

@@ -43,7 +43,7 @@ void main()
   out_normal = vec4(0.0);
   out_entry = vec4(0.0);
   vec4 place = point_position_fetch(texel);
-  if (place.w == 0.0 || cell_coat_fetch(texel).w == 0.0) {
+  if (number >= exits || place.w == 0.0 || cell_coat_fetch(texel).w == 0.0) {
     return;
   }
   point_face = octahedral_decode(point_normal_fetch(texel).zw);
