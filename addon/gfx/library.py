@@ -291,6 +291,7 @@ _dropped: list[_Kept] = []
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
 compile_seconds = 0.0  # what that took
 first_uses = 0  # how many programs were drawn with for the first time
+has_freed = False  # whether this process has freed any
 
 
 def _count_first_use() -> None:
@@ -356,6 +357,7 @@ def _free_old() -> None:
 
 def _free_dropped() -> None:
     """Free what waits for a context like this one and is held by nothing else."""
+    global has_freed
     if not _dropped:
         return
     gpu.shader.unbind()  # the last one that drew may be among them
@@ -364,6 +366,8 @@ def _free_dropped() -> None:
         one = _dropped.pop(0)
         if one.lasts != lasts or not one.is_alone:
             _dropped.append(one)
+        else:
+            has_freed = True
 
 
 def free_lasting(most: int) -> None:

@@ -9,6 +9,7 @@ from functools import lru_cache
 import gpu
 import numpy as np
 
+from . import library
 from .context import is_only_one, on_enter, on_leave, on_picture, on_release, overtakes_draws
 from .device import computes_beat_fragments
 from .geometry import Batch, vertex_buffer
@@ -210,11 +211,21 @@ def get_for(program: Program, textures: dict[str, Image]) -> Shader:
     return _for_images(program, {"textures": textures})
 
 
+# Between any two others where a flush may have ended what is bound (`compute`).
+NOTHING = Program(name="nothing", compute="generated/main", snippets=(("generated/main", "void main() {}"),))
+
+
 def compute(program: Program, size: tuple[int, int], **bindings) -> None:
     """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
     shader = _for_images(program, bindings)
     if overtakes_draws():
         finish()
+        # Mesa 22.3 frees, at a flush, the programs of a context that another one has dropped. It unbinds what is bound
+        # to the driver and still takes it for bound: the same one again ends with a segmentation fault.
+        if library.has_freed:
+            between = get(NOTHING)
+            between.bind()
+            gpu.compute.dispatch(between.handle, 1, 1, 1)
     shader.bind(**bindings)
     groups = [-(-extent // group) for extent, group in zip((*size, 1), program.group)]
     gpu.compute.dispatch(shader.handle, *groups)
