@@ -1,6 +1,7 @@
 """What OpenGL's contexts share, and what each of them remembers by itself."""
 
 import ctypes
+from itertools import pairwise
 
 import bpy
 import gpu
@@ -132,5 +133,5 @@ def test_once_a_program_was_freed_none_is_dispatched_twice_in_a_row(gpu_context,
     for _ in range(3):
         passes.compute(program, (8, 8), images={"result": image})
     assert len(dispatched) == (6 if freed else 3)
-    assert not freed or all(one != other for one, other in zip(dispatched, dispatched[1:]))
+    assert not freed or all(one != other for one, other in pairwise(dispatched))
     assert (images.read(image) == 3.0).all()
