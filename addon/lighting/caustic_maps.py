@@ -9,6 +9,10 @@ the sample's end: irradiance in W/m2, and the distance along the view's axis of 
 of the texels around its place whose surface lies on its plane. Shadow rays of hits take glass as opaque for the lights
 answered for, as those of pixels do.
 
+Where Cycles' switches leave diffuse surfaces without some of a light's caustics (caustic_casters.py), lobes have a map
+of their own, with all photons: the switches are about diffuse closures alone. Of a light that diffuse closures are to
+have nothing of, there is this one only.
+
 Cost, per sample and view: a draw of the surfaces, the splats, a pass over the map; per round of rays a pass over the
 hits for each CELLS views, which share an image; 4 x 4 bytes a texel for each of its cells, and of one view 7 x 4 x 4
 more. A map has as many texels along each side as the picture has pixels, from LEAST_SIDE to SIDE: mirrors show what
@@ -46,14 +50,22 @@ COLUMNS, ROWS = 4, 2
 CELLS = COLUMNS * ROWS  # of an image of kept maps, which a pass over hits asks all
 EXTENT = 3.0  # of the map, beside the casters as the light sees them
 LEAST_TEXELS = 1.04
-INTO_MAP = splats.splat_program(
-    "photon into caustic map",
-    "caustics/map.frag.glsl",
-    "map_view.row_x, map_view.row_y, map_view.row_w, map_view.row_q, map_view.backward.w",
-    textures=MAP,
-    blocks=((VIEW, "map_view"),),
-    outputs=(("VEC4", "out_irradiance"),),
-)
+
+
+def _into_map(defines: tuple[tuple[str, str], ...] = ()) -> Program:
+    return splats.splat_program(
+        "photon into caustic map",
+        "caustics/map.frag.glsl",
+        "map_view.row_x, map_view.row_y, map_view.row_w, map_view.row_q, map_view.backward.w",
+        textures=MAP,
+        blocks=((VIEW, "map_view"),),
+        defines=defines,
+        outputs=(("VEC4", "out_irradiance"),),
+    )
+
+
+INTO_MAP = _into_map()
+ALL_INTO_MAP = _into_map((("ALL", ""),))  # also what diffuse surfaces are not to have
 KEEP = passes.fullscreen_program(
     "caustic map kept",
     "caustics/keep.frag.glsl",
@@ -62,7 +74,16 @@ KEEP = passes.fullscreen_program(
     constants=(("IVEC2", "cell_corner"),),
     outputs=(("VEC4", "out_kept"),),
 )
-KEPT_FIELDS = ("row_x", "row_y", "row_w", "eye", "right", "up", "backward", "frame")  # of VIEW, by cell
+KEPT_FIELDS = (
+    "row_x",
+    "row_y",
+    "row_w",
+    "eye",
+    "right",
+    "up",
+    "backward",
+    "frame",
+)  # of VIEW, by cell; w of `right`: whether diffuse closures take the map, of `up`: whether lobes do
 KEPT_VIEWS = Struct("KeptViews", *(("vec4", f"{name}[{CELLS}]") for name in KEPT_FIELDS))
 SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "surface_normal", "surface_diffuse"))
 AT_HITS = ("energy_table", "ray_direction", "met_path", "hit_passed", "kept_maps")
@@ -88,7 +109,7 @@ def at_hits_program(transmission: bool, soft: bool = False) -> Program:
 
 
 PROGRAMS = (INTO_MAP, KEEP, *(at_hits_program(transmission) for transmission in (False, True)))
-DECLARED = tuple(at_hits_program(transmission, True) for transmission in (False, True))
+DECLARED = (ALL_INTO_MAP, *(at_hits_program(transmission, True) for transmission in (False, True)))
 
 
 @dataclass
@@ -123,7 +144,8 @@ class CausticMaps:
         self._pending: tuple[LitView, LightView, images.Image] | None = None
         self._splat: Callable[[Bundle], None] | None = None
         self._receivers = LightBuffers()
-        self._map: images.Target | None = None
+        self._maps: list[images.Target] = []
+        self._takers: list[tuple[bool, bool]] = []  # of each: diffuse closures, lobes
         self._block: Block | None = None
         self._blocks: list[Block] = []
         self._shift = np.zeros(2)
@@ -166,10 +188,11 @@ class CausticMaps:
         return self._count < MOST or caustic_casters.key_of(light.emitter) in self.lights
 
     def add(
-        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, photons: Photons
-    ) -> Callable[[Bundle], None]:
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, photons: Photons,
+        gloss_apart: bool = False,
+    ) -> Callable[[Bundle], None]:  # fmt: skip
         """Draw what the light's view shows, or take the map of its other points; the function that is returned splats a
-        bundle into it. `keep` ends the map that was added last."""
+        bundle into it. `keep` ends the map that was added last. `gloss_apart`: lobes have a map of their own."""
         if self._shares(light):
             return self._splat
         self.keep(frame, technique)
@@ -181,22 +204,24 @@ class CausticMaps:
             # Light of a point beside the middle lands beside what that shows, by less than this at any distance.
             seen_from = light.middle
             extent *= max(1.0, light.emitter.reach / float(np.linalg.norm(seen_from.high - seen_from.low)))
+        key = caustic_casters.key_of(light.emitter)
         view = widened(seen_from, extent, corners[None] - frame.geometry.origin, side, self._shift)
         block, seen = self._receivers.receivers(frame, technique, view, casters.refracting | set(casters.going_on))
         caught = {name: seen[name.replace("receiver", "surface")] for _, name in MAP}
-        if self._map is None or self._map.size != (side, side):
-            self._give_map()
-            self._map = images.Target((images.pool.take(side, side, "RGBA32F"),))
-        self._map.clear()
+        self._takers = [(True, not gloss_apart)] if casters.wanted(key) or not gloss_apart else []
+        self._takers += [(False, True)] * gloss_apart
+        maps = self._maps_of(side)
 
         def splat(bundle: Bundle) -> None:
             records = photons.footprints(frame, technique, bundle, block, LEAST_TEXELS)
-            splats.draw(INTO_MAP, self._map, records, textures=caught, blocks={"map_view": block})
-            frame.count(technique, "passes")
+            for one, (by_diffuse, _) in zip(maps, self._takers):
+                program = INTO_MAP if by_diffuse else ALL_INTO_MAP
+                splats.draw(program, one, records, textures=caught, blocks={"map_view": block})
+                frame.count(technique, "passes")
 
         self._pending, self._splat = (light, view, caught["receiver_position"]), splat
         self._count += 1
-        self.lights.add(caustic_casters.key_of(light.emitter))
+        self.lights.add(key)
         return splat
 
     def _shares(self, light: LitView) -> bool:
@@ -211,21 +236,24 @@ class CausticMaps:
         self._pending = None
         values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
         self._block = _updated(self._block, VIEW, values)
-        if not self.maps or len(self.maps[-1].views) == CELLS:
-            self.maps.append(KeptMaps(images.pool.take(COLUMNS * view.side, ROWS * view.side, "RGBA32F"), view.side))
-        kept = self.maps[-1]
-        corner = kept.next_corner
-        passes.fullscreen(
-            KEEP,
-            images.Target((kept.image,)),
-            viewport=(*corner, view.side, view.side),
-            textures={"caustic_map": self._map.colors[0], "receiver_position": position},
-            blocks={"map_view": self._block},
-            constants={"cell_corner": corner},
-        )
-        frame.count(technique, "passes")
-        kept.views.append(values)
-        kept.block = None
+        for one, (by_diffuse, by_lobes) in zip(self._maps, self._takers):
+            if not self.maps or len(self.maps[-1].views) == CELLS:
+                image = images.pool.take(COLUMNS * view.side, ROWS * view.side, "RGBA32F")
+                self.maps.append(KeptMaps(image, view.side))
+            kept = self.maps[-1]
+            corner = kept.next_corner
+            passes.fullscreen(
+                KEEP,
+                images.Target((kept.image,)),
+                viewport=(*corner, view.side, view.side),
+                textures={"caustic_map": one.colors[0], "receiver_position": position},
+                blocks={"map_view": self._block},
+                constants={"cell_corner": corner},
+            )
+            frame.count(technique, "passes")
+            takers = {"right": (*values["right"][:3], by_diffuse), "up": (*values["up"][:3], by_lobes)}
+            kept.views.append({**values, **takers})
+            kept.block = None
 
     def ready(self, frame: Frame) -> list[KeptMaps]:
         """`of`, with the blocks that programs bind."""
@@ -240,13 +268,25 @@ class CausticMaps:
     def release(self) -> None:
         """Give all images back."""
         self.end()
-        self._give_map()
+        self._give_maps()
         self._receivers.release()
         self.__init__()
 
-    def _give_map(self) -> None:
-        if self._map is not None:
-            images.pool.give(self._map.colors[0])
+    def _maps_of(self, side: int) -> list[images.Target]:
+        """One for each of the takers, empty."""
+        if self._maps and self._maps[0].size != (side, side):
+            self._give_maps()
+        while len(self._maps) < len(self._takers):
+            self._maps.append(images.Target((images.pool.take(side, side, "RGBA32F"),)))
+        found = self._maps[: len(self._takers)]
+        for one in found:
+            one.clear()
+        return found
+
+    def _give_maps(self) -> None:
+        for one in self._maps:
+            images.pool.give(one.colors[0])
+        self._maps = []
 
 
 def _updated(block: Block | None, struct: Struct, values: dict) -> Block:

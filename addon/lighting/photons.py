@@ -74,6 +74,7 @@ EMISSION = Struct(
     ("int", "bends"),  # 1: photons of the refracted lobe
 )
 
+ALL_WANTED = 4  # of photon_gloss, as in shaders/caustics/photon.frag.glsl
 
 PHOTONS = passes.fullscreen_program(
     "photons",
@@ -353,10 +354,11 @@ class Photons:
 
     def traced(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int,
-        on_gloss: int = 0,
+        on_gloss: int = 0, all_wanted: bool = False,
     ) -> Iterator[Bundle]:  # fmt: skip
         """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next.
-        `on_gloss`: glossy lobes take those that smooth glass lets pass (REFRACTED) and mirrors (REFLECTED), a sum."""
+        `on_gloss`: glossy lobes take those that smooth glass lets pass (REFRACTED) and mirrors (REFLECTED), a sum.
+        `all_wanted`: also those that neither these nor diffuse surfaces are to have."""
         target = self._target("_found", light.view.side, len(FOUND))
         for block, bound in self._drawn(frame, technique, casters, light, interfaces):
             textures = {
@@ -369,7 +371,8 @@ class Photons:
                 textures=textures,
                 blocks={"film_view": block, **bound["blocks"]},
                 constants={
-                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index, "photon_gloss": on_gloss,
+                    "offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index,
+                    "photon_gloss": on_gloss | ALL_WANTED * all_wanted,
                     "photon_diffuse": casters.wanted(caustic_casters.key_of(light.emitter)),
                 },
             )  # fmt: skip

@@ -166,14 +166,15 @@ class ScreenSpacePhotons(Technique):
         on_gloss = frame.shared(caustic_casters.Answered).on_gloss
         seen = {k: image for k, image in surface_bindings(frame).items() if ("RGBA32F", k) in self._splat.textures}
         at_hits = maps is not None and maps.wants(frame, light)
-        if at_hits:
-            into_kept = maps.add(frame, self, self._casters, light, self._photons)
-        # Rays of gloss leave out what photons bring it: of lamps whose light they take glass as opaque for.
         key, rayed = caustic_casters.key_of(light.emitter), frame.service(ShadedLobes) is not None
+        gloss_apart = at_hits and self._casters.wanted(key) != (REFRACTED | REFLECTED) and may_be_glossy(frame.snapshot)
+        if at_hits:
+            into_kept = maps.add(frame, self, self._casters, light, self._photons, gloss_apart)
+        # Rays of gloss leave out what photons bring it: of lamps whose light they take glass as opaque for.
         known = not rayed or key == caustic_casters.WORLD or key in frame.kept(CausticMaps).lights
         onto_gloss = _lobes_on_gloss(frame, light) if on_gloss and known and key != caustic_casters.MESHES else 0
         interfaces = frame.settings.get(self, "interfaces")
-        for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, onto_gloss):
+        for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, onto_gloss, gloss_apart):
             yield
             records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
             splats.draw(

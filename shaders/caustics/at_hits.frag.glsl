@@ -1,6 +1,6 @@
 // The caustics of lights on what rays have met: what diffuse closures there reflect of the irradiance that kept maps hold
 // for their place, and, as if it came straight from the light, glossy lobes from which no ray goes on and with SOFT those
-// without microfacets. Of the four texels around it those count whose surface lies on the hit's plane. The maps are cells of
+// without microfacets. Each map says which of them take it. Of the four texels around it those count whose surface lies on the hit's plane. The maps are cells of
 // one image.
 #include "lib/view.glsl"
 #include "lib/gbuffer.glsl"
@@ -116,8 +116,8 @@ void main()
   for (int cell = 0; cell < map_count; cell++) {
     map_view = view_of_cell(cell);
     vec3 arriving = irradiance_at(place.xyz, normal, map_side * ivec2(cell % MAP_COLUMNS, cell / MAP_COLUMNS));
-    irradiance += arriving;
-    if ((shines || has_soft) && max_component(arriving) > 0.0) {
+    irradiance += map_view.right.w * arriving;
+    if ((shines || has_soft) && map_view.up.w > 0.0 && max_component(arriving) > 0.0) {
       vec3 to_light = safe_normalize(way_to_light(place.xyz));
       float density;
       vec3 reflected = shines ? lobe_reflection(lobe, to_light, density) : vec3(0.0);

@@ -1,4 +1,5 @@
-// A photon on the receivers that a light's view shows: irradiance, W/m2, texel by texel.
+// A photon on the receivers that a light's view shows: irradiance, W/m2, texel by texel; with ALL of what diffuse surfaces
+// are not to have, too.
 #include "lib/gbuffer.glsl"
 #include "caustics/receiver.glsl"
 #include "caustics/arrival.glsl"
@@ -8,7 +9,12 @@ void main()
   ivec2 texel = ivec2(gl_FragCoord.xy);
   vec4 place = receiver_position_fetch(texel);
   out_irradiance = vec4(0.0);
-  if (place.w == 0.0 || !arrives_on_diffuse(splat_centre.w)) {
+#ifdef ALL
+  bool taken = true;
+#else
+  bool taken = arrives_on_diffuse(splat_centre.w);
+#endif
+  if (place.w == 0.0 || !taken) {
     discard;
   }
   vec3 normal = octahedral_decode(receiver_normal_fetch(texel).zw);
