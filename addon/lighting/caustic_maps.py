@@ -74,16 +74,8 @@ KEEP = passes.fullscreen_program(
     constants=(("IVEC2", "cell_corner"),),
     outputs=(("VEC4", "out_kept"),),
 )
-KEPT_FIELDS = (
-    "row_x",
-    "row_y",
-    "row_w",
-    "eye",
-    "right",
-    "up",
-    "backward",
-    "frame",
-)  # of VIEW, by cell; w of `right`: whether diffuse closures take the map, of `up`: whether lobes do
+# Of VIEW, by cell; w of `right`: whether diffuse closures take the map, of `up`: whether lobes do.
+KEPT_FIELDS = ("row_x", "row_y", "row_w", "eye", "right", "up", "backward", "frame")
 KEPT_VIEWS = Struct("KeptViews", *(("vec4", f"{name}[{CELLS}]") for name in KEPT_FIELDS))
 SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "surface_normal", "surface_diffuse"))
 AT_HITS = ("energy_table", "ray_direction", "met_path", "hit_passed", "kept_maps")

@@ -1,7 +1,7 @@
 // The caustics of lights on what rays have met: what diffuse closures there reflect of the irradiance that kept maps hold
 // for their place, and, as if it came straight from the light, glossy lobes from which no ray goes on and with SOFT those
-// without microfacets. Each map says which of them take it. Of the four texels around it those count whose surface lies on the hit's plane. The maps are cells of
-// one image.
+// without microfacets. Each map says which of them take it. Of the four texels around it those count whose surface lies on
+// the hit's plane. The maps are cells of one image.
 #include "lib/view.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"

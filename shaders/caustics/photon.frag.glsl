@@ -127,8 +127,8 @@ void main()
   }
   bool passes = bends;
   // Smooth glass next to the light, then glass alone, which mirrors from within or is smooth; `photon_gloss`: 1 where gloss
-  // sees the light through glass, 2 where it sees it mirrored, 4: maps for hits want all; `photon_diffuse`: 1 and 2 the same of what diffuse surfaces
-  // see, by the last interface, which is the one next to them.
+  // sees the light through glass, 2 where it sees it mirrored, 4: maps for hits want all; `photon_diffuse`: 1 and 2 the same of
+  // what diffuse surfaces see, by the last interface, which is the one next to them.
   bool clear = (photon_gloss & (bends ? 1 : 2)) != 0 && lobe_spread == 0.0 && (bends || surface_is_mirror_of_glass(s));
   if (passes != (dot(onward, geometric_normal) < 0.0)) {
     return;
