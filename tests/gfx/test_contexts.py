@@ -1,6 +1,7 @@
 """What OpenGL's contexts share, and what each of them remembers by itself."""
 
 import ctypes
+import gc
 from itertools import pairwise
 
 import bpy
@@ -61,12 +62,16 @@ def three(value):
     return {name: images.upload(np.full((4, 4, 4), value + k, np.float32)) for k, name in enumerate(NAMES)}
 
 
+def library_of_opengl():
+    try:
+        return ctypes.CDLL("libGL.so.1")
+    except OSError:
+        pytest.skip("no libGL.so.1, which is asked what Blender does not tell")
+
+
 def bound():
     """OpenGL's names of the textures that the current context has bound to its units, and of those bound as images."""
-    try:
-        opengl = ctypes.CDLL("libGL.so.1")
-    except OSError:
-        pytest.skip("no libGL.so.1, of which the names are asked")
+    opengl = library_of_opengl()
     textures, images_of = (ctypes.c_int * MOST_TEXTURES)(), (ctypes.c_int * MOST_IMAGES)()
     for unit in range(MOST_TEXTURES):
         opengl.glActiveTexture(TEXTURE_0 + unit)
@@ -116,6 +121,44 @@ def test_an_image_is_read_itself_where_another_context_freed_one_and_made_it(tar
         assert seen() == [value, value + 1.0, value + 2.0]
 
 
+def writes(value):
+    main = f"void main() {{ imageStore(result, ivec2(gl_GlobalInvocationID.xy), vec4({value})); }}"
+    return library.Program(
+        name=f"writes {value}", compute="generated/main", images=(("result", "RGBA32F", "FLOAT_2D", "WRITE"),),
+        snippets=(("generated/main", main),),
+    )  # fmt: skip
+
+
+def test_a_context_dispatches_on_where_another_one_has_freed_what_it_linked(gpu_context, elsewhere):
+    """Mesa 22.3 then unbinds what is bound at the next flush, takes it for bound, and ended the process: whole runs of
+    tests ended so."""
+    if gpu.platform.backend_type_get() != "OPENGL":
+        pytest.skip("flushes are OpenGL's")
+    flush = library_of_opengl().glFlush
+    image = images.upload(np.zeros((8, 8, 4), np.float32))
+    freed, kept, other = writes(1.0), writes(2.0), writes(3.0)
+    found = []
+
+    def written(program):
+        passes.compute(program, (8, 8), images={"result": image})
+        found.append(images.read(image).mean())
+
+    def flushed():
+        for _ in range(3):
+            written(kept)
+            flush()
+
+    elsewhere(lambda: [written(freed), written(kept)])
+    with images.lasting_context():
+        written(freed)
+        del library._shaders[freed]
+        gc.collect()
+        library._free_dropped()
+        written(other)
+    elsewhere(flushed)
+    assert found == [1.0, 2.0, 1.0, 3.0, 2.0, 2.0, 2.0]
+
+
 @pytest.mark.parametrize("freed", [False, True])
 def test_once_a_program_was_freed_none_is_dispatched_twice_in_a_row(gpu_context, monkeypatch, freed):
     """Mesa 22.3 may have unbound it at a flush in between, and takes it for bound: whole runs of tests ended there."""
@@ -125,11 +168,7 @@ def test_once_a_program_was_freed_none_is_dispatched_twice_in_a_row(gpu_context,
     monkeypatch.setattr(gpu.compute, "dispatch", lambda *given: (dispatched.append(given[0]), dispatch(*given)))
     monkeypatch.setattr(library, "has_freed", freed)
     image = images.upload(np.zeros((8, 8, 4), np.float32))
-    main = "void main() { imageStore(result, ivec2(gl_GlobalInvocationID.xy), vec4(3.0)); }"
-    program = library.Program(
-        name="threes", compute="generated/main", images=(("result", "RGBA32F", "FLOAT_2D", "WRITE"),),
-        snippets=(("generated/main", main),),
-    )  # fmt: skip
+    program = writes(3.0)
     for _ in range(3):
         passes.compute(program, (8, 8), images={"result": image})
     assert len(dispatched) == (6 if freed else 3)
