@@ -100,6 +100,7 @@ def test_auto_is_a_choice_of_its_own_and_what_is_off_stays_off(floor):
 
 
 @pytest.mark.slow
+@pytest.mark.timing  # within 12 seconds it is to come to parameters
 def test_a_scene_with_relief_glare_and_ends_of_its_own_is_tuned_by_numbers_of_the_scene(floor, monkeypatch):
     """Relief's numbers are the material's, those of glare the camera's; neither is tried."""
     plane = next(thing for thing in floor.objects if thing.type == "MESH")
