@@ -57,9 +57,9 @@ def has_links(rows: list[np.ndarray]) -> bool:
     """Whether any of these lights, (TEXELS, 4) each, leaves out receivers, or any emissive mesh where one of them is a
     point on such a mesh."""
     at = lights.LIGHT.at
-    kinds = [int(row[at.kind]) for row in rows]
-    by_meshes = (kind == lights.SURFACE and row[at.cone] > 0.0 for kind, row in zip(kinds, rows))
-    return max(kinds, default=0) >= lights.KIND_STEPS or any(by_meshes)
+    return any(
+        row[at.kind] >= lights.KIND_STEPS or (row[at.kind] == lights.SURFACE and row[at.cone] > 0.0) for row in rows
+    )
 
 
 def linked(

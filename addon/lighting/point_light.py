@@ -84,9 +84,8 @@ class PointLight:
         the third where mirrors would send it, by luminance. `instances`: of which instance each point is (z: its row in
         the geometry's image), for lights that leave out objects. `without`: ids of lamps that are left out.
         `photons`: what glass passes of light that photons answer for arrives with these; of a target of three, w of the
-        second says how much is of such light. `lobe`: above 0 light counts
-        by that power of the cosine, normalized, as at the normal. Returns the numbers of passes and of
-        rays a point."""
+        second says how much is of such light. `lobe`: above 0 light counts by that power of the cosine,
+        normalized, as at the normal. Returns the numbers of passes and of rays a point."""
         number = frame.sample if number is None else number
         by_blockers: dict[frozenset[int], list[np.ndarray]] = {}  # that let light pass
         for passing, row in (*self._lamps(frame, number, without, photons), *self._emitted(frame, number, photons)):

@@ -109,8 +109,13 @@ class PointMaps(Technique, VisibilityProvider):
         """Whether rays take the place of this light's maps."""
         return by_rays(
             frame, lambda: self.views(frame, emitter, emitter.middle(), 0), self.resolution(frame), self,
-            emitter.light.name if emitter.light else "light", glass_absorbs(frame) and not answered(frame, emitter),
+            emitter.light.name if emitter.light else "light", self.is_absorbed(frame, emitter),
         )  # fmt: skip
+
+    @staticmethod
+    def is_absorbed(frame: Frame, emitter: lights.Emitter) -> bool:
+        """Whether glass absorbs this light's on straight ways, which maps do not know."""
+        return not answered(frame, emitter) and glass_absorbs(frame)
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views that cover point `number` of the light, at `sample`, for all receivers."""

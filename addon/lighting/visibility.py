@@ -230,8 +230,8 @@ def drawn_stochastically(frame: Frame, stopped: frozenset[int] = frozenset()) ->
 def glass_absorbs(frame: Frame) -> bool:
     """Whether some caster is glass whose inside absorbs: of light that passes it straight maps do not know how far that
     goes through it, rays do."""
-    compiled = frame.materials.compiled
-    return any(any(compiled[draw.material].absorbed_inside) for draw in drawn_stochastically(frame))
+    absorbing = {k for k, one in enumerate(frame.materials.compiled) if any(one.absorbed_inside)}
+    return bool(absorbing) and any(draw.material in absorbing for draw in drawn_stochastically(frame))
 
 
 def by_rays(

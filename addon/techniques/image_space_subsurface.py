@@ -120,36 +120,29 @@ CHORD = passes.fullscreen_program(
     defines=(("RANGE", str(RANGE)),),
     outputs=(("VEC4", "out_shape"),),
 )  # fmt: skip
+# Of programs that follow rays of points through glass; ImageSpaceSubsurface._followed binds it.
+FOLLOWED_TEXTURES = (
+    *acceleration.HIERARCHY_TEXTURES,
+    *POINT_TEXTURES[:2],
+    ("RG32F", "trace_owners"),
+    *(("RGBA32F", name) for name in ("point_instances", "glass_indices", "scatter_near")),
+)
 COAT = passes.fullscreen_program(
     "subsurface coat",
     "subsurface/coat.frag.glsl",
-    textures=(
-        *acceleration.HIERARCHY_TEXTURES,
-        *POINT_TEXTURES[:2],
-        ("RG32F", "trace_owners"),
-        *(("RGBA32F", name) for name in (
-            "point_instances", "scatter_means", "glass_indices", "scatter_objects", "scatter_near",
-        )),
-    ),
+    textures=(*FOLLOWED_TEXTURES, ("RGBA32F", "scatter_means"), ("RGBA32F", "scatter_objects")),
     blocks=((VIEW, "film_view"),),
     constants=(("FLOAT", "offset_size"), ("INT", "bounces"), ("INT", "first_object"), ("INT", "first_leaf")),
     outputs=tuple(("VEC4", f"out_{name}") for name in ("coat", "bent", "again", "landed")),
-)  # fmt: skip
+)
 EXIT = passes.fullscreen_program(
     "where rays leave glass",
     "subsurface/exit.frag.glsl",
-    textures=(
-        *acceleration.HIERARCHY_TEXTURES,
-        *POINT_TEXTURES,
-        ("RG32F", "trace_owners"),
-        *(("RGBA32F", name) for name in (
-            "point_instances", "scatter_near", "glass_indices", "cell_coat", "cell_bent",
-        )),
-    ),
+    textures=(*FOLLOWED_TEXTURES, *POINT_TEXTURES[2:], ("RGBA32F", "cell_coat"), ("RGBA32F", "cell_bent")),
     blocks=((VIEW, "film_view"),),
     constants=(("FLOAT", "offset_size"), ("INT", "first_leaf"), ("INT", "exits")),
     outputs=tuple(("VEC4", f"out_{name}") for name in ("position", "normal", "entry", "instance")),
-)  # fmt: skip
+)
 ENTER = passes.fullscreen_program(
     "light that enters in glass",
     "subsurface/enter.frag.glsl",
@@ -248,9 +241,8 @@ class ImageSpaceSubsurface(Technique):
         # Of cells, where anything is glass: by how much more light enters, how by the cosine at which it arrives, how
         # much of what leaves comes back, and from which cells.
         self._coats: tuple[images.Image, ...] = ()
-        self._indices: images.Image | None = (
-            None  # of refraction, by material; and by instance whether glass may be around
-        )
+        # Of refraction, by material; and by instance whether glass may be around.
+        self._indices: images.Image | None = None
         self._around: images.Target | None = None  # light by way of glass, added up over a picture
         self._arounds = self._exits = 0  # samples, and rays of a point, that this is of
         self._coated: set[int] = set()  # materials of what glass may be around
@@ -392,22 +384,27 @@ class ImageSpaceSubsurface(Technique):
         listed[: len(indices), 0], listed[rows, 1] = indices, 1.0
         self._coats = tuple(images.pool.take(ROW, self.points.rows, "RGBA32F") for _ in COAT.outputs)
         self._indices = images.upload_list(listed)
-        position, normal = self.points.surface(0)
-        owners, first_leaf = frame.kept(Hits).owners(frame, frame.hierarchy("shadow"))
+        textures, constants = self._followed(frame, *self.points.surface(0))
         passes.fullscreen(
             COAT, images.Target(self._coats),
             textures={
-                **frame.hierarchy("shadow").textures, "trace_owners": owners, "scatter_objects": self.points.table,
-                "scatter_near": self.points.near, "point_position": position, "point_normal": normal,
-                "point_instances": self.points.instances, "scatter_means": frame.kept(ScatterMeans).image,
-                "glass_indices": self._indices,
+                **textures, "scatter_objects": self.points.table, "scatter_means": frame.kept(ScatterMeans).image,
             },
             blocks={"film_view": frame.view_block},
             constants={
-                "offset_size": frame.offset_size, "bounces": frame.settings.bounces,
-                "first_object": self.points.first_object, "first_leaf": first_leaf,
+                **constants, "bounces": frame.settings.bounces, "first_object": self.points.first_object,
             },
         )  # fmt: skip
+
+    def _followed(self, frame: Frame, position: images.Image, normal: images.Image) -> tuple[dict, dict]:
+        """Textures and constants by which rays of points are followed through glass."""
+        hierarchy = frame.hierarchy("shadow")
+        owners, first_leaf = frame.kept(Hits).owners(frame, hierarchy)
+        textures = {
+            **hierarchy.textures, "point_position": position, "point_normal": normal, "trace_owners": owners,
+            "point_instances": self.points.instances, "glass_indices": self._indices, "scatter_near": self.points.near,
+        }  # fmt: skip
+        return textures, {"offset_size": frame.offset_size, "first_leaf": first_leaf}
 
     # Light at points of the mesh --------------------------------------------------------------------------------------
 
@@ -484,19 +481,16 @@ class ImageSpaceSubsurface(Technique):
         exits = LATER_EXITS if self._arounds else EXITS
         self._arounds += 1
         self._exits += exits
-        owners, first_leaf = frame.kept(Hits).owners(frame, frame.hierarchy("shadow"))
+        textures, constants = self._followed(frame, position, normal)
         with ExitStack() as stack:
             found = [stack.enter_context(images.borrowed(*size, "RGBA32F")).colors[0] for _ in EXIT.outputs]
             passes.fullscreen(
                 EXIT, images.Target(tuple(found)),
                 textures={
-                    **frame.hierarchy("shadow").textures, "trace_owners": owners, "point_position": position,
-                    "point_normal": normal, "point_entry": tint, "point_instances": self.points.instances,
-                    "scatter_near": self.points.near, "glass_indices": self._indices, "cell_coat": self._coats[0],
-                    "cell_bent": self._coats[1],
+                    **textures, "point_entry": tint, "cell_coat": self._coats[0], "cell_bent": self._coats[1],
                 },
                 blocks={"film_view": frame.view_block},
-                constants={"offset_size": frame.offset_size, "first_leaf": first_leaf, "exits": exits},
+                constants={**constants, "exits": exits},
             )  # fmt: skip
             drawn, rays = self._light_on(frame, *found[:3], self._around, found[3], LOBE * self._arounds**0.5)
         frame.count(self, "passes", 1 + drawn)
@@ -612,7 +606,7 @@ class ImageSpaceSubsurface(Technique):
         for image in (self._shapes, *self._coats):
             if image is not None:
                 images.pool.give(image)
-        self._shapes, self._coats = None, ()
+        self._shapes, self._coats, self._indices = None, (), None
         self._coated = set()
 
     def _give_whole(self) -> None:

@@ -47,13 +47,7 @@ from ..lighting.point_maps import PointMaps
 from ..lighting.shadow_costs import Foreseen, Weighed
 from ..lighting.silhouettes import Extent
 from ..lighting.soft_maps import SoftMaps
-from ..lighting.visibility import (
-    VisibilityProvider,
-    drawn_stochastically,
-    glass_absorbs,
-    has_extent,
-    rays_beside,
-)
+from ..lighting.visibility import VisibilityProvider, drawn_stochastically, has_extent, rays_beside
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from .accumulated_maps import AccumulatedMaps
@@ -159,8 +153,7 @@ class ShadowsByLight(PointMaps):
         kinds, soft = {}, []
         for emitter in emitters:
             sharp = penumbra(frame, emitter) * self._providers[PLAIN].resolution(frame) < 1.0
-            absorbed = glass_absorbs(frame) and not answered(frame, emitter)
-            if sharp or absorbed or self._is_seen_in_parts(frame, emitter):
+            if sharp or self.is_absorbed(frame, emitter) or self._is_seen_in_parts(frame, emitter):
                 kinds[emitter.light.key] = PLAIN
             else:
                 soft.append(emitter)

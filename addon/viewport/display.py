@@ -89,17 +89,14 @@ class Display:
         if guided is None:
             return
         spent, fresh = 0.0, library.news()
-        parts, going = self._guiding(frame, scene, scale // guided), True
-        while going:
-            started = time.perf_counter()
-            going = next(parts, parts) is not parts
-            if not going:
-                images.finish()
+        started = time.perf_counter()
+        for _ in self._guiding(frame, scene, scale // guided):
             spent += time.perf_counter() - started
-            if going:
-                yield
+            yield
+            started = time.perf_counter()
+        images.finish()
         if library.news() == fresh:
-            self.guides.learn(spent, pixels // guided**2)
+            self.guides.learn(spent + time.perf_counter() - started, pixels // guided**2)
         self._refined = self._guide.fine
 
     def _guiding(self, frame: Frame, scene: Scene, finer: int) -> Iterator[None]:

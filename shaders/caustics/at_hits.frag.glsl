@@ -100,7 +100,6 @@ void main()
   Surface s = SURFACE_READ(pixel);
   vec3 viewer = -ray_direction_fetch(pixel).xyz;
   bool shines = s.kind <= FRESNEL_F82 && max_component(s.glossy_weight) > 0.0 && !lobe_goes_on(s);
-  Lobe lobe = lobe_begin(s, viewer);
 #ifdef SOFT
   SoftLobe soft = soft_lobe_begin(s, viewer);
   bool has_soft = soft.exists && !soft.fibre && soft.kind != LOBE_TRANSLUCENT;
@@ -110,6 +109,7 @@ void main()
   if (code == 0 || place.w == 0.0 || (max_component(albedo) <= 0.0 && !shines && !has_soft)) {
     return;
   }
+  Lobe lobe = lobe_begin(s, viewer);
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
   vec3 irradiance = vec3(0.0);
   vec3 by_lobe = vec3(0.0);

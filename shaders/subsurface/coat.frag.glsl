@@ -6,11 +6,11 @@
 //
 //   leaves / (1 - F) * sum over bounces k of (albedo back)^k;     of a flat layer leaves = (1 - F) / n2, back = 1 - leaves
 //
-// Bent glass brings light of a lamp elsewhere than a straight ray. So of light straight from
-// sources, which arrives at the cosine c to the point's normal, enters (a + b c) in place of c; a and b are those with which the
-// directions in which rays leave have the mean and the mean cosine that they have (out_bent.xy, without the sum over bounces). These
-// are of rays that leave by the first face, above the point's horizon; others see sources where they leave (exit.frag.glsl), for
-// which out_bent.z is the number of rays over those that are not lost.
+// Bent glass brings light of a lamp elsewhere than a straight ray. So of light straight from sources, which arrives at the cosine c
+// to the point's normal, enters (a + b c) in place of c; a and b are those with which the directions in which rays leave have the
+// mean and the mean cosine that they have (out_bent.xy, without the sum over bounces). These are of rays that leave by the first
+// face, above the point's horizon; others see sources where they leave (exit.frag.glsl), for which out_bent.z is the number of rays
+// over those that are not lost.
 // What the glass mirrors back of it comes from where it left: out_landed has the cells of four of the rays, drawn by what each
 // brings, out_again what of the light there enters here (echo.frag.glsl).
 //

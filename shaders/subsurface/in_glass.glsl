@@ -1,10 +1,10 @@
-// A ray from a point in clear solid glass through the glass's faces, mirrored by Fresnel's reflectance. A program that includes this
-// binds the hierarchy and `glass_indices`, has `offset_size`, and defines before:
+// A ray from a point in clear solid glass through its faces, mirrored by Fresnel's reflectance. A program that includes this binds
+// the hierarchy and `glass_indices`, has `offset_size`, and defines before:
 //
-//   ray_leaves(share, place, outwards, direction, index, faces)  the share leaves at `place` of a face along `direction`, after the ray
-//                                                      has been mirrored by `faces` others
-//   ray_stays(share, hit, met, direction, faces)       that share meets what stands in the glass; with no faces before, the glass
-//                                                      is not around the point
+//   ray_leaves(share, place, outwards, direction, index, faces)  the share leaves at `place` of a face along `direction`, after
+//                                                      the ray has been mirrored by `faces` others
+//   ray_stays(share, hit, met, direction, faces)       that share meets what stands in the glass; with no faces before, the
+//                                                      glass is not around the point
 #define FACES 12  // that a ray is mirrored by
 
 // Index of refraction of a material that is clear glass and nothing else; 0 of others, and of a single sheet: of light below

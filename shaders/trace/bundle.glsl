@@ -33,7 +33,7 @@ uint open_behind(int leaf, vec3 origin, mat4 rays, uint open)
     bvec4 inside = lessThanEqual(max(max(-u, -v), max(u + v - vec4(1.0), -t)), vec4(0.0));
     t = mix(mix(vec4(1e30), t, inside), vec4(1e30), edge_on);
     if (min(min(t.x, t.y), min(t.z, t.w)) < rays[k].w && ((open >> uint(k)) & 1u) != 0u) {
-      vec4 opacity = opacity_of_four(leaf, t, rays[k].w, origin, direction, facing, false, false);
+      vec4 opacity = opacity_of_four(opacity_codes(leaf), leaf, t, rays[k].w, origin, direction, facing, false, false);
       t = mix(vec4(1e30), t, greaterThanEqual(opacity, vec4(1.0)));
       if (min(min(t.x, t.y), min(t.z, t.w)) < rays[k].w) {
         open &= ~(1u << uint(k));

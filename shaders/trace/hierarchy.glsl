@@ -169,14 +169,18 @@ float tile_opacity(ivec2 hit, float code, bool front, bool to_lamp, vec3 positio
 }
 #endif
 
-// The share of rays that four triangles stop, met at the distances `t`, of those before `limit`; below 0 where such rays do not
-// meet them. Codes are negative where the
-// triangle may also bend what meets it; they hold which rays it is about, 0: all, 1: not those that look for a light, 2:
-// those alone, 3: all, and those for certain (glass: those that it is a sheet for, by the side that they meet); and the
-// coverage of either side, or, if MAPPED, of which tile.
-vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec4 facing, bool bent, bool shadow)
+// Of a leaf's four triangles what `opacity_of_four` reads: negative where a triangle may also bend what meets it; which rays it
+// is about, 0: all, 1: not those that look for a light, 2: those alone, 3: all, and those for certain (glass: those that it is a
+// sheet for, by the side that they meet); and the coverage of either side, or, if MAPPED, of which tile.
+vec4 opacity_codes(int leaf)
 {
-  vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
+  return leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
+}
+
+// The share of rays that four triangles stop, by their codes, met at the distances `t`, of those before `limit`; below 0 where
+// such rays do not meet them.
+vec4 opacity_of_four(vec4 code, int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec4 facing, bool bent, bool shadow)
+{
   vec4 stopped = floor(abs(code) / (SIDES * SIDES));
   vec4 sides = abs(code) - stopped * (SIDES * SIDES);
   vec4 front = floor(sides / SIDES);
@@ -216,9 +220,8 @@ vec4 stopped_by_angle(vec4 even, vec4 cosine)
 }
 
 // The same share by angle of those of four triangles that are glass, no sheet, and have no tile.
-vec4 glass_by_angle(int leaf, Four f, vec4 facing, vec3 direction, vec4 opacity)
+vec4 glass_by_angle(vec4 code, Four f, vec4 facing, vec3 direction, vec4 opacity)
 {
-  vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
   vec4 glass = vec4(lessThan(code, vec4(0.0))) * vec4(greaterThan(code, vec4(-3.0 * SIDES * SIDES)));
   glass *= vec4(greaterThanEqual(opacity, vec4(0.0)));
   if (dot(glass, vec4(1.0)) == 0.0) {
@@ -456,11 +459,12 @@ void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool
   vec4 t = intersect_four(four, origin, direction, facing);
   float best = min(min(t.x, t.y), min(t.z, t.w));
   if (best < nearest) {
-    vec4 opacity = opacity_of_four(leaf, t, nearest, origin, direction, facing, bent, shadow);
+    vec4 code = opacity_codes(leaf);
+    vec4 opacity = opacity_of_four(code, leaf, t, nearest, origin, direction, facing, bent, shadow);
 #ifdef OPAQUE_ONLY
     opacity = floor(opacity);
 #else
-    opacity = (bent || shadow) ? opacity : glass_by_angle(leaf, four, facing, direction, opacity);
+    opacity = (bent || shadow) ? opacity : glass_by_angle(code, four, facing, direction, opacity);
 #endif
     uint roll = hash3(uvec3(uint(leaf), salt, 77u + uint(record))).x;
     vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
@@ -692,7 +696,7 @@ vec3 triangle_shading_normal(ivec2 hit, vec3 position)
 // Whether a triangle may bend rays: is glass.
 bool triangle_is_glass(ivec2 hit)
 {
-  return leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)] < 0.0;
+  return opacity_codes(hit.x)[HIT_SLOT(hit)] < 0.0;
 }
 
 // The share of rays of paths that a triangle of glass, no sheet, stops at this cosine. `even`: that of even light; it is both
@@ -701,7 +705,7 @@ float glass_stops(ivec2 hit, float cosine, inout float even)
 {
   float share = even;
 #ifndef OPAQUE_ONLY
-  float code = -leaf_texel(hit.x * LEAF_TEXELS + OPACITY_TEXEL)[HIT_SLOT(hit)];
+  float code = -opacity_codes(hit.x)[HIT_SLOT(hit)];
   if (code < 3.0 * SIDES * SIDES) {
     even = mod(code, SIDES) / (SIDES - 1.0);
     share = stopped_by_angle(vec4(even), vec4(cosine)).x;

@@ -116,11 +116,8 @@ def test_shapes_of_a_draft_come_in_by_one_program_a_redraw(scene, cold, monkeypa
     """Three where a lamp is in view."""
     bpy.ops.object.light_add(type="POINT", location=scene.camera.matrix_world @ Vector((0.0, 0.0, -3.0)))
     bpy.context.object.data.shadow_soft_size, bpy.context.object.visible_camera = 0.1, True
-    wanted, redraws, compile_one = (
-        {f"first look {name}" for name in ("lamps", "shines", "guides")},
-        [],
-        library._compile,
-    )
+    wanted = {f"first look {name}" for name in ("lamps", "shines", "guides")}
+    redraws, compile_one = [], library._compile
 
     def noted(program):
         redraws[-1].update({program.name} & wanted)
@@ -135,21 +132,28 @@ def test_shapes_of_a_draft_come_in_by_one_program_a_redraw(scene, cold, monkeypa
     assert sorted(map(sorted, filter(None, redraws))) == sorted([name] for name in wanted)
 
 
+def made_by_parts(scene, made, samples):
+    """What each part of a draft, and then of a picture, adds to `made`, in which programs are noted as they compile."""
+    region = Region()
+    settings = replace(settings_of(scene, viewport=True), samples=samples)
+    renderer, snapshot = region.viewport.renderer, region.source(region.camera, *SIZE)
+    parts = []
+    for drawn in (settings.as_draft(), settings):
+        frame, before = renderer.begin(snapshot, drawn), len(made)
+        for _ in renderer.steps(frame):
+            parts.append(made[before:])
+            before = len(made)
+    region.viewport.release()
+    return parts
+
+
 def test_programs_of_the_film_come_in_one_by_one(scene, monkeypatch):
     """In a draft and in full, where light between points of the film has one more."""
     library._shaders.clear()
     made, compile_one = [], library._compile
     monkeypatch.setattr(library, "_compile", lambda program: made.append(program.name) or compile_one(program))
-    region = Region()
-    settings = replace(settings_of(scene, viewport=True), samples=1)
-    renderer, snapshot = region.viewport.renderer, region.source(region.camera, *SIZE)
-    together = []
-    for drawn in (settings.as_draft(), settings):
-        frame, before = renderer.begin(snapshot, drawn), len(made)
-        for _ in renderer.steps(frame):
-            together.append([name for name in made[before:] if name.startswith("film ") and name != "film depth"])
-            before = len(made)
-    region.viewport.release()
+    parts = made_by_parts(scene, made, samples=1)
+    together = [[name for name in names if name.startswith("film ") and name != "film depth"] for names in parts]
     first_words = {" ".join(name.split(" ")[:2]) for names in together for name in names}
     assert first_words >= {"film collect", "film filter,", "film light"}, first_words
     assert max(map(len, together)) == 1, together
@@ -171,16 +175,7 @@ def test_programs_that_follow_rays_come_in_one_by_one(scene, monkeypatch):
         return compile_one(program)
 
     monkeypatch.setattr(library, "_compile", noted)
-    region = Region()
-    settings = replace(settings_of(scene, viewport=True), samples=2)
-    renderer, snapshot = region.viewport.renderer, region.source(region.camera, *SIZE)
-    together = []
-    for drawn in (settings.as_draft(), settings):
-        frame, before = renderer.begin(snapshot, drawn), len(made)
-        for _ in renderer.steps(frame):
-            together.append(made[before:])
-            before = len(made)
-    region.viewport.release()
+    together = made_by_parts(scene, made, samples=2)
     assert {"instant radiosity", "instant radiosity, rays", "light at hits", "bounced light at hits"} <= set(made)
     assert max(map(len, together)) == 1, [names for names in together if len(names) > 1]
 
